@@ -1,0 +1,1 @@
+"""Weights and the sample light field, loaded as package data."""

@@ -1,0 +1,1 @@
+"""GLSL sources, loaded as package data by app.canvas."""
