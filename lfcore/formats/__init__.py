@@ -1,1 +1,73 @@
-"""One module per kind of file; `lfcore.formats.open_light_field` asks each by content."""
+"""Files and folders that hold light fields. `open_light_field` decides by content which reader is asked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from lfcore.errors import InputError
+from lfcore.formats import eslf, views_folder
+from lfcore.formats.images import check_memory, read_header
+from lfcore.lightfield import LightField
+
+__all__ = ["open_light_field"]
+
+_LYTRO_MAGIC = b"\x89LFP\r\n\x1a\n"
+
+_KINDS = "an ESLF picture (14 x 14 px per microlens) or a folder with one picture per view"
+
+
+def open_light_field(
+    path: str | os.PathLike[str],
+    *,
+    views: int = 8,
+    progress: Callable[[float], None] | None = None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> LightField:
+    """Open a light field of any kind that is understood: an ESLF picture, a folder of views, or one view of a folder.
+
+    `views` is the side of the middle square of views taken from an ESLF (2 to 14; 8 as in the paper, 14 for all).
+    `progress` is called in the calling thread with rising values up to 1; `cancelled` is asked often. Values keep their
+    stored depth. Raises InputError (one sentence) for whatever cannot be opened, Cancelled where `cancelled` says so.
+    """
+    path = Path(path).expanduser()
+    _check_reachable(path)
+    if path.is_dir():
+        return views_folder.read(path, progress, cancelled)
+    _refuse_lytro_container(path)
+    header = read_header(path)
+    check_memory(path, header)
+    if eslf.has_camera_size(header):
+        return eslf.read(path, views, progress, cancelled)
+    if views_folder.sniff(path):
+        return views_folder.read(path, progress, cancelled)
+    if eslf.divides(header):
+        return eslf.read(path, views, progress, cancelled)
+    raise InputError(
+        f"{path} is a picture of {header.size} px, which is neither whole 14 x 14 px microlenses nor one view among "
+        f"others in its folder; expected {_KINDS}."
+    )
+
+
+def _check_reachable(path: Path) -> None:
+    try:
+        path.stat()
+    except FileNotFoundError as error:
+        raise InputError(f"{path} does not exist; expected {_KINDS}.") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path} cannot be opened: {reason}; check the path and its permissions.") from error
+
+
+def _refuse_lytro_container(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            magic = file.read(len(_LYTRO_MAGIC))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}; check its permissions.") from error
+    if magic == _LYTRO_MAGIC:
+        raise InputError(
+            f"{path} is a Lytro container, whose raw picture is not decoded yet; export it as ESLF or as a folder of "
+            "views and open that."
+        )
