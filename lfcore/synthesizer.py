@@ -151,7 +151,7 @@ class NetworkSynthesizer:
                 clock.lap("disparity")
             _check(cancelled)
             warped = backward_warp(corners, disparity.expand(4, -1, -1, -1), offsets)  # (4, 3, H, W)
-            h_features = colour_features(disparity, warped.view(1, 12, height, width), torch.tensor([[u, v]]))
+            h_features = colour_features(disparity, warped.reshape(1, 12, height, width), torch.tensor([[u, v]]))
             clock.lap("warp")
             for tile, source in tiles(height, width, self._tile):
                 _check(cancelled)
