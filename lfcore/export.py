@@ -1,0 +1,112 @@
+"""Pictures and disparity maps to files: PNG for looking at, TIFF and EXR for computing with. All writes are atomic."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import OpenImageIO as oiio
+
+from lfcore.atomic import atomic_path
+from lfcore.errors import OutputError
+from lfcore.lightfield import CORNERS, FloatArray
+
+IMAGE_EXTENSIONS = (".png", ".tif", ".tiff", ".exr")
+DISPARITY_EXTENSIONS = (".tif", ".tiff", ".exr")
+
+
+def check_target(path: str | os.PathLike[str], extensions: Collection[str]) -> Path:
+    """Make sure, before long work, that a file of one of these extensions (lower case, with dot) can be written here.
+
+    Raises OutputError: unknown extension, missing or read-only folder, read-only file, a folder of that name.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in extensions:
+        found = f"ends in {target.suffix}" if target.suffix else "has no extension"
+        raise OutputError(f"Cannot write {target}: its name {found}; choose one of {', '.join(extensions)}.")
+    if target.is_dir():
+        raise OutputError(f"Cannot write {target}: it is a folder; give the name of a file.")
+    if target.exists() and not target.stat().st_mode & stat.S_IWUSR:
+        raise OutputError(f"Cannot write {target}: the file is read-only; choose another name.")
+    check_folder(target.parent)
+    return target
+
+
+def check_folder(folder: Path) -> None:
+    """Make sure that files can be made in this existing folder, by making one. Raises OutputError."""
+    if not folder.is_dir():
+        found = "is not a folder" if folder.exists() else "does not exist"
+        raise OutputError(f"Cannot write to {folder}: it {found}; make the folder first or choose another.")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"Cannot write to {folder}: {error.strerror}; choose another folder.") from error
+
+
+def make_folder(folder: str | os.PathLike[str]) -> Path:
+    """The folder, made with its parents if it is missing, and checked to be writable. Raises OutputError."""
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot make the folder {path}: {error.strerror}; choose another place.") from error
+    check_folder(path)
+    return path
+
+
+def write_image(path: str | os.PathLike[str], image: FloatArray) -> None:
+    """Write a picture (H, W, 3), 1 = white: PNG with 8 bits, TIFF with 16 bits, EXR as half floats.
+
+    The values are written as they are, in the tone of the light field; no transfer function is applied. OutputError
+    where the target cannot be written.
+    """
+    target = check_target(path, IMAGE_EXTENSIONS)
+    stored = {".png": "uint8", ".exr": "half"}.get(target.suffix.lower(), "uint16")
+    _write(target, np.clip(image, 0, 1), stored, {})
+
+
+def write_picture(path: str | os.PathLike[str], picture: npt.NDArray[np.uint8]) -> None:
+    """Write a finished 8-bit picture (H, W, 3), such as a figure, as PNG."""
+    _write(check_target(path, (".png",)), picture, "uint8", {})
+
+
+def write_disparity(path: str | os.PathLike[str], disparity: FloatArray) -> None:
+    """Write a disparity map (H, W), px over the full corner-to-corner baseline: TIFF or EXR, one channel, float32."""
+    target = check_target(path, DISPARITY_EXTENSIONS)
+    note = "disparity in pixels over the full corner-to-corner baseline; positive: content moves to larger x as u grows"
+    _write(target, disparity[..., None], "float", {"ImageDescription": note})
+
+
+def write_warped(folder: str | os.PathLike[str], warped: FloatArray, extension: str) -> list[Path]:
+    """Write the four warped inputs (4, H, W, 3) as warped_u0_v0, warped_u0_v1, ... in the folder; returns the paths."""
+    directory = make_folder(folder)
+    paths = [directory / f"warped_u{u:.0f}_v{v:.0f}{extension}" for u, v in CORNERS]
+    for path, image in zip(paths, warped, strict=True):
+        write_image(path, image)
+    return paths
+
+
+def _write(target: Path, values: npt.NDArray[np.generic], stored: str, attributes: dict[str, str]) -> None:
+    height, width, channels = values.shape
+    spec = oiio.ImageSpec(width, height, channels, stored)
+    for name, text in attributes.items():
+        spec.attribute(name, text)
+    if target.suffix.lower() in (".tif", ".tiff"):
+        spec.attribute("compression", "zip")
+    with atomic_path(target) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        if output is None:
+            raise OutputError(f"Cannot write {target}: {oiio.geterror()}; choose another kind of file.")
+        try:
+            done = output.open(str(temporary), spec) and output.write_image(np.ascontiguousarray(values))
+        finally:
+            closed = output.close()
+        if not (done and closed):
+            reason = output.geterror() or "the disk may be full"
+            raise OutputError(f"Cannot write {target}: {reason}; choose another place or make room there.")
