@@ -79,7 +79,7 @@ def read(
     dark = find_dark_views(sliced)
     warnings = []
     if any(corner in dark for corner in ((0, 0), (0, views - 1), (views - 1, 0), (views - 1, views - 1))):
-        warnings.append("The corner views are dark, and so will be what is synthesized from them: open the middle 8 x 8.")
+        warnings.append("The corner views are dark, and so is what is synthesized from them: open the middle 8 x 8.")
     return LightField(
         views=sliced,
         name=path.stem,

@@ -134,7 +134,7 @@ def _cannot_open(path: Path, reason: str) -> InputError:
         return InputError(f"{path} cannot be read: {error.strerror}; check its permissions.")
     if empty:
         return InputError(f"{path} is empty (0 bytes); copy or export it again.")
-    return InputError(f"{path} is no picture that can be read ({_first_line(reason)}); it is damaged or of another kind.")
+    return InputError(f"{path} is not a readable picture ({_first_line(reason)}); it is damaged or of another kind.")
 
 
 def _header(path: Path, spec: Any) -> Header:

@@ -25,7 +25,7 @@ RULES = "view_RR_CC, lf_R_C, input_CamNNN, out_RR_CC_Y_X, or any names with the 
 
 @dataclass(frozen=True)
 class Grid:
-    """The views of a folder: the file of each (row, column), counted from 0 without gaps, and what else the names tell."""
+    """The views of a folder: the file of each (row, column) from 0 without gaps, and what else the names tell."""
 
     kind: str
     files: Mapping[Index, Path]
