@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lfcore import colormaps
-from lfcore.figures import ByteArray, Cell, Legend, figure
+from lfcore.figures import ByteArray, Cell, Legend, disparity_cell, figure
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import absolute_error, k16, k16_view, to_uint8
 
@@ -81,7 +81,7 @@ class SceneResult:
 
 
 def evaluate_scene(light_field: LightField, synthesizer: Synthesizer) -> SceneResult:
-    """Synthesize the protocol's view from the corners alone and score it. Raises InputError where there is none to score."""
+    """Synthesize the protocol's view from the corners alone and score it. InputError where there is none to score."""
     row, column = k16_view(light_field)
     truth = light_field.view(row, column)
     synthesizer.set_light_field(light_field)
@@ -122,14 +122,7 @@ def scene_figure(light_field: LightField, result: SceneResult) -> ByteArray:
 def _disparity_cell(synthesis: Synthesis, size: tuple[int, ...]) -> Cell:
     if synthesis.disparity is None:
         return Cell(np.full((*size, 3), 48, np.uint8), f"no disparity (model {synthesis.model})")
-    colours = colormaps.disparity_colours()
-    # Outermost percentiles, so that a few stray pixels do not take up the whole scale.
-    low, high = (float(value) for value in np.percentile(synthesis.disparity, (1, 99)))
-    return Cell(
-        colormaps.apply(colours, synthesis.disparity, low, high),
-        "disparity, pixels from corner to corner",
-        Legend(colours, f"{low:.1f} px or less", f"{high:.1f} px or more"),
-    )
+    return disparity_cell(synthesis.disparity)
 
 
 def score_table(evaluations: Sequence[Evaluation]) -> str:
@@ -152,7 +145,8 @@ def score_table(evaluations: Sequence[Evaluation]) -> str:
         )
         lines.append(f"{name:<{first}}  {cells}")
     means = "  ".join(
-        f"{e.mean_psnr:>{width - 18}.2f} {e.mean_ssim:>7.4f} {'':>9}" for e, width in zip(evaluations, widths, strict=True)
+        f"{e.mean_psnr:>{width - 18}.2f} {e.mean_ssim:>7.4f} {'':>9}"
+        for e, width in zip(evaluations, widths, strict=True)
     )
     return "\n".join([*lines, f"{'mean':<{first}}  {means}".rstrip()])
 

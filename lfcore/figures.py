@@ -9,6 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import OpenImageIO as oiio
 
+from lfcore import colormaps
+from lfcore.lightfield import FloatArray
+
 ByteArray = npt.NDArray[np.uint8]
 
 _FONT = "DroidSans"  # comes with OpenImageIO
@@ -16,6 +19,7 @@ _FONT_SIZE = 15
 _LINE = 24  # height of a caption
 _MARGIN = 8
 _LEGEND_BAR = 10
+_LEGEND = 2 + _LEGEND_BAR + _LINE  # height of a legend
 _BACKGROUND, _INK = 24, 0.9
 
 
@@ -37,19 +41,33 @@ class Cell:
     legend: Legend | None = None
 
 
+def disparity_cell(disparity: FloatArray) -> Cell:
+    """A disparity map (H, W), px from corner to corner, in colours, with the range they stand for."""
+    colours = colormaps.disparity_colours()
+    # Outermost percentiles, so that a few stray pixels do not take up the whole scale.
+    low, high = (float(value) for value in np.percentile(disparity, (1, 99)))
+    return Cell(
+        colormaps.apply(colours, disparity, low, high),
+        "disparity, pixels from corner to corner",
+        Legend(colours, f"{_one_decimal(low)} px or less", f"{_one_decimal(high)} px or more"),
+    )
+
+
 def figure(cells: Sequence[Cell], columns: int) -> ByteArray:
-    """Set cells of one picture size row by row into one picture (H, W, 3), uint8; captions too long for it are cut off."""
-    height, width = cells[0].picture.shape[:2]
-    rows = -(-len(cells) // columns)
-    cell_height = _LINE + height + (_LEGEND_BAR + _LINE if any(cell.legend for cell in cells) else 0) + _MARGIN
-    cell_width = width + _MARGIN
-    page = np.full((rows * cell_height + _MARGIN, columns * cell_width + _MARGIN, 3), _BACKGROUND, np.uint8)
+    """Set cells of one picture size row by row into one picture (H, W, 3), uint8; captions too long are cut off."""
     for index, cell in enumerate(cells):
         if cell.picture.shape != cells[0].picture.shape:
             raise ValueError(f"cell {index} is {cell.picture.shape}, the first is {cells[0].picture.shape}")
-        row, column = divmod(index, columns)
-        top, left = _MARGIN + row * cell_height, _MARGIN + column * cell_width
-        _draw_cell(page[top : top + cell_height, left : left + width], cell)
+    height, width = cells[0].picture.shape[:2]
+    rows = [cells[first : first + columns] for first in range(0, len(cells), columns)]
+    heights = [_LINE + height + (_LEGEND if any(cell.legend for cell in row) else 0) + _MARGIN for row in rows]
+    page = np.full((sum(heights) + _MARGIN, columns * (width + _MARGIN) + _MARGIN, 3), _BACKGROUND, np.uint8)
+    top = _MARGIN
+    for row, row_height in zip(rows, heights, strict=True):
+        for column, cell in enumerate(row):
+            left = _MARGIN + column * (width + _MARGIN)
+            _draw_cell(page[top : top + row_height, left : left + width], cell)
+        top += row_height
     return page
 
 
@@ -75,5 +93,11 @@ def _text_line(width: int, text: str, align: str) -> ByteArray:
     drawn = oiio.ImageBufAlgo.render_text(line, x, _LINE - 8, text, _FONT_SIZE, _FONT, (_INK,) * 3, align, "baseline")
     if not drawn:
         raise RuntimeError(f"OpenImageIO cannot draw text: {line.geterror()}")
-    pixels: npt.NDArray[np.float32] = line.get_pixels(oiio.FLOAT)
+    pixels = line.get_pixels(oiio.FLOAT)
+    if pixels is None:
+        raise RuntimeError(f"OpenImageIO cannot hand out the drawn text: {line.geterror()}")
     return np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
+
+
+def _one_decimal(value: float) -> str:
+    return f"{round(value, 1) + 0.0:.1f}"  # without the sign of a rounded -0.0

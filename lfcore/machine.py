@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def machine() -> str:
-    """One line such as "Intel(R) Core(TM) i7-8700, 12 cores, Linux, torch 2.13.0"; the same for every call in a process."""
+    """One line, such as "Intel(R) Core(TM) i7-8700, 12 cores, Linux, torch 2.13.0"."""
     count = core_count()
     cores = "1 core" if count == 1 else f"{count} cores"
     return f"{_processor()}, {cores}, {platform.system()}, torch {importlib.metadata.version('torch')}"

@@ -8,12 +8,19 @@ evenly; the lawnmower is open.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from lfcore.cache import SynthesisCache, cache_key
 from lfcore.errors import InputError
+from lfcore.lightfield import LightField
+from lfcore.metrics import to_uint8
+
+if TYPE_CHECKING:
+    from lfcore.synthesizer import Synthesizer
 
 Viewpoints = list[tuple[float, float]]
 DoubleArray = npt.NDArray[np.float64]
@@ -71,6 +78,20 @@ PATHS: dict[str, Callable[..., Viewpoints]] = {
     "lawnmower": lawnmower,
     "spiral": spiral,
 }
+
+
+def rendered(
+    viewpoints: Iterable[tuple[float, float]], light_field: LightField, synthesizer: Synthesizer, cache: SynthesisCache
+) -> Iterator[npt.NDArray[np.uint8]]:
+    """The views along a path as 8-bit frames (H, W, 3), made one by one; what was seen before comes from the cache."""
+    synthesizer.set_light_field(light_field)
+    for u, v in viewpoints:
+        key = cache_key(light_field, synthesizer, u, v)
+        synthesis = cache.get(key)
+        if synthesis is None:
+            synthesis = synthesizer.synthesize(u, v)
+            cache.put(key, synthesis)
+        yield to_uint8(synthesis.image)
 
 
 def _check(frames: int, radius: float) -> None:

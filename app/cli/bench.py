@@ -1,0 +1,61 @@
+"""`lfview bench`: seconds a view by stage, memory, and the share of what the processor can do."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from app.cli.common import Verbs, add_verb, check_json_target, write_json
+from app.progress import Progress
+from lfcore.errors import InputError
+
+_MOST_VIEWS = 1000
+
+
+def add_parser(verbs: Verbs[Any], name: str) -> None:
+    """Declare the verb."""
+    parser = add_verb(verbs, name, "measure the speed of synthesis on this machine", "lfview bench --json bench.json")
+    parser.add_argument("path", metavar="PATH", type=Path, nargs="?", help="a light field (default: the sample)")
+    parser.add_argument(
+        "--model",
+        action="append",
+        dest="models",
+        metavar="NAME",
+        help="full (default), mean, or a .safetensors file; may be given more than once",
+    )
+    parser.add_argument("--count", type=int, default=5, metavar="N", help="viewpoints timed after the warm-up (default: 5)")
+    parser.add_argument("--viewer", action="store_true", help="also time the frames of the viewer's window (needs a display)")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON (- for standard output)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure the ceiling, then each model, each in a process of its own."""
+    check_json_target(options.json)
+    if not 1 <= options.count <= _MOST_VIEWS:
+        raise InputError(f"The number of viewpoints is {options.count}; it must be from 1 to {_MOST_VIEWS}.")
+
+    from assets import sample_path
+    from lfcore import bench
+    from lfcore.machine import machine
+
+    path = options.path or sample_path()
+    names = list(dict.fromkeys(options.models or ["full"]))
+    with Progress("measuring", len(names) + 1, "parts") as bar:
+        ceiling = bench.in_fresh_process(bench.measure_ceiling)
+        bar.step()
+        speeds = {}
+        for name in names:
+            speeds[name] = bench.in_fresh_process(bench.measure_model, name, path, options.count, ceiling)
+            bar.step()
+    measured = bench.as_json(machine(), ceiling, speeds)
+    if options.viewer:
+        from app.viewer import measure_frames
+
+        measured["viewer"] = measure_frames(path, names[0])
+    if options.json:
+        write_json(measured, options.json)
+    if options.json != "-":
+        print(bench.as_text(measured))
+    return 0

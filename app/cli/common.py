@@ -1,0 +1,100 @@
+"""What several verbs share: their options, opening with a progress bar, scenes of a folder, JSON out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.progress import Progress
+from lfcore.errors import InputError
+
+if TYPE_CHECKING:
+    from lfcore.lightfield import LightField
+
+_PICTURES = {".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".bmp"}
+
+Verbs = argparse._SubParsersAction  # argparse has no public name for it
+
+
+def add_verb(verbs: Verbs[Any], name: str, summary: str, example: str) -> argparse.ArgumentParser:
+    """A verb's parser with its summary and an example at the end of its help."""
+    parser: argparse.ArgumentParser = verbs.add_parser(
+        name,
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=f"example: {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    return parser
+
+
+def add_light_field(parser: argparse.ArgumentParser) -> None:
+    """PATH and --views, for the verbs that open one light field."""
+    parser.add_argument("path", metavar="PATH", type=Path, help="an ESLF picture or a folder of views")
+    parser.add_argument(
+        "--views", type=int, default=8, metavar="N", help="side of the middle square of views taken from an ESLF (default: 8)"
+    )
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """--model, for the verbs that use one."""
+    parser.add_argument(
+        "--model",
+        default="full",
+        metavar="NAME",
+        help="full (the paper's two networks, default), mean (average of the corners), or a .safetensors file",
+    )
+
+
+def viewpoint(text: str) -> tuple[float, float]:
+    """Parse "U,V"."""
+    parts = text.split(",")
+    try:
+        u, v = (float(part) for part in parts)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a viewpoint; give two numbers such as 0.5,0.5") from error
+    return u, v
+
+
+def open_with_progress(path: Path, views: int = 8) -> LightField:
+    """Open a light field, with a bar on a terminal."""
+    from lfcore.formats import open_light_field
+
+    with Progress(f"reading {path.name}", 1) as bar:
+        return open_light_field(path, views=views, progress=bar.reach)
+
+
+def scenes_in(paths: list[Path]) -> list[Path]:
+    """The paths, each folder of folders replaced by the folders in it, sorted. Raises InputError for missing paths."""
+    scenes: list[Path] = []
+    for path in paths:
+        if not path.exists():
+            raise InputError(f"{path} does not exist; give a light field, or a folder with one light field in each folder.")
+        children = sorted(path.iterdir()) if path.is_dir() else []
+        folders = [child for child in children if child.is_dir() and not child.name.startswith(".")]
+        holds_pictures = any(child.suffix.lower() in _PICTURES for child in children)
+        scenes += folders if folders and not holds_pictures else [path]
+    return scenes
+
+
+def check_json_target(target: str | None) -> None:
+    """Make sure that JSON can be written there: "-" is standard output. Raises OutputError."""
+    from lfcore.export import check_target
+
+    if target is not None and target != "-":
+        check_target(target, (".json",))
+
+
+def write_json(value: Any, target: str) -> None:
+    """Write JSON to a file, or to standard output where the target is "-"."""
+    from lfcore.atomic import atomic_path
+
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    with atomic_path(target) as temporary:
+        temporary.write_text(text, encoding="utf-8")
