@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
 from lfcore.errors import InputError
 from lfcore.formats import eslf, views_folder
+from lfcore.formats.describe import describe
 from lfcore.formats.images import check_memory, read_header
 from lfcore.lightfield import LightField
 
-__all__ = ["open_light_field"]
+__all__ = ["describe", "open_light_field"]
 
 _LYTRO_MAGIC = b"\x89LFP\r\n\x1a\n"
 
@@ -31,7 +33,7 @@ def open_light_field(
     `progress` is called in the calling thread with rising values up to 1; `cancelled` is asked often. Values keep their
     stored depth. Raises InputError (one sentence) for whatever cannot be opened, Cancelled where `cancelled` says so.
     """
-    path = Path(path).expanduser()
+    path = Path(path)
     _check_reachable(path)
     if path.is_dir():
         return views_folder.read(path, progress, cancelled)
@@ -52,12 +54,15 @@ def open_light_field(
 
 def _check_reachable(path: Path) -> None:
     try:
-        path.stat()
+        mode = path.stat().st_mode
     except FileNotFoundError as error:
         raise InputError(f"{path} does not exist; expected {_KINDS}.") from error
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path} cannot be opened: {reason}; check the path and its permissions.") from error
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        # A pipe would be waited for without end.
+        raise InputError(f"{path} is neither a file nor a folder; expected {_KINDS}.")
 
 
 def _refuse_lytro_container(path: Path) -> None:

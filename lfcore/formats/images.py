@@ -30,6 +30,9 @@ _DTYPES: dict[str, np.dtype[Any]] = {
     "double": np.dtype(np.float32),
 }
 
+# The same depths in OpenImageIO's words, to ask for them when reading.
+_FORMATS = {"uint8": "uint8", "uint16": "uint16", "float32": "float"}
+
 
 @dataclass(frozen=True)
 class Header:
@@ -87,7 +90,7 @@ class Picture:
         """All pixels, (H, W, C) with C = 3, or 1 for grey."""
         header = self.header
         end = header.first_channel + header.channels
-        pixels = self._source.read_image(0, 0, header.first_channel, end, header.dtype.name)
+        pixels = self._source.read_image(0, 0, header.first_channel, end, _FORMATS[header.dtype.name])
         return self._checked(pixels, header.height)
 
     def read_rows(self, begin: int, end: int) -> Pixels:
@@ -97,7 +100,7 @@ class Picture:
         # OpenImageIO counts rows from the data window's origin, which EXR files may place anywhere.
         origin = self._source.spec().y
         pixels = self._source.read_scanlines(
-            begin + origin, end + origin, 0, header.first_channel, last, header.dtype.name
+            begin + origin, end + origin, 0, header.first_channel, last, _FORMATS[header.dtype.name]
         )
         return self._checked(pixels, end - begin)
 
@@ -134,6 +137,8 @@ def _cannot_open(path: Path, reason: str) -> InputError:
         return InputError(f"{path} cannot be read: {error.strerror}; check its permissions.")
     if empty:
         return InputError(f"{path} is empty (0 bytes); copy or export it again.")
+    if "format reader" in reason:
+        return InputError(f"{path} is no picture; expected a light field in {', '.join(EXTENSIONS)}.")
     return InputError(f"{path} is not a readable picture ({_first_line(reason)}); it is damaged or of another kind.")
 
 

@@ -20,6 +20,8 @@ _HCI = re.compile(r"input_cam(\d+)", re.IGNORECASE)
 # Families of names taken before any other when a folder holds several of one size (views beside depth maps, say).
 _PREFERRED = re.compile(r"(view|lf|input_cam|out|sai)", re.IGNORECASE)
 
+GANTRY = "Stanford gantry folder"
+
 RULES = "view_RR_CC, lf_R_C, input_CamNNN, out_RR_CC_Y_X, or any names with the row and the column as two whole numbers"
 
 
@@ -190,7 +192,7 @@ def _gantry(folder: Path, files: Sequence[Path]) -> Grid:
         assert match is not None
         indexed.append(((int(match[1]), int(match[2])), file))
         positions.append((int(match[2]), float(match[4])))
-    grid = _arrange(folder, "Stanford gantry folder", indexed)
+    grid = _arrange(folder, GANTRY, indexed)
     low, high = min(column for column, _ in positions), max(column for column, _ in positions)
     first = [x for column, x in positions if column == low]
     last = [x for column, x in positions if column == high]
@@ -201,7 +203,7 @@ def _gantry(folder: Path, files: Sequence[Path]) -> Grid:
     if mean_last < mean_first:
         ordered = {(row, grid.columns - 1 - column): file for (row, column), file in ordered.items()}
         facts["Column order"] = "reversed against the names, so that the camera moves to the right"
-    return Grid("Stanford gantry folder", ordered, grid.rows, grid.columns, facts)
+    return Grid(GANTRY, ordered, grid.rows, grid.columns, facts)
 
 
 def _hci(folder: Path, files: Sequence[Path]) -> Grid:

@@ -6,14 +6,16 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from lfcore.disparity_sign import Order, check_disparity
 from lfcore.errors import Cancelled, InputError
 from lfcore.formats.dark import find_dark_views
 from lfcore.formats.images import EXTENSIONS, Header, Pixels, check_memory, open_picture, read_header
-from lfcore.formats.names import RULES, Grid, belongs_to_grid, find_grid
+from lfcore.formats.names import GANTRY, RULES, Grid, belongs_to_grid, find_grid
 from lfcore.lightfield import LightField
 
 # More threads than this gain nothing: the decoders wait for memory by then.
@@ -22,7 +24,12 @@ _MAX_THREADS = 8
 
 def sniff(path: Path) -> bool:
     """Whether `path` is a folder, or a picture that its neighbours' names make one view of a grid."""
-    return path.is_dir() or (path.suffix.lower() in EXTENSIONS and belongs_to_grid(path, _pictures(path.parent)))
+    if path.is_dir():
+        return True
+    try:
+        return path.suffix.lower() in EXTENSIONS and belongs_to_grid(path, _pictures(path.parent))
+    except InputError:
+        return False
 
 
 def read(
@@ -52,7 +59,7 @@ def read(
         facts["Colour"] = "grey pictures, the one channel repeated"
     if folder != given:
         facts["Folder"] = str(folder)
-    return LightField(
+    light_field = LightField(
         views=views,
         name=given.resolve().name,
         source=str(path),
@@ -61,6 +68,7 @@ def read(
         warnings=tuple(warnings),
         dark=find_dark_views(views),
     )
+    return _checked_against_pictures(light_field)
 
 
 def _pictures(folder: Path) -> list[Path]:
@@ -135,6 +143,29 @@ def _read_all(
             pool.shutdown(cancel_futures=True)
             raise
     return bad_values
+
+
+def _checked_against_pictures(light_field: LightField) -> LightField:
+    """Warn where rows and columns run against the pictures; put the rows of a gantry folder right.
+
+    The gantry's columns are already in the order of the camera's x, so where one axis is reversed it must be the rows.
+    """
+    check = check_disparity(light_field)
+    if check.order is Order.REVERSED and light_field.kind == GANTRY:
+        _reverse_rows(light_field.views)
+        facts = {**light_field.facts, "Row order": "reversed against the names, as the pictures show"}
+        return replace(light_field, facts=facts, dark=find_dark_views(light_field.views))
+    if check.is_wrong:
+        return replace(light_field, warnings=(*light_field.warnings, check.sentence))
+    return light_field
+
+
+def _reverse_rows(views: Pixels) -> None:
+    """In place and row by row, since the views of a gantry may fill much of the memory."""
+    for row in range(len(views) // 2):
+        upper = views[row].copy()
+        views[row] = views[-1 - row]
+        views[-1 - row] = upper
 
 
 def _check_alike(file: Path, header: Header, first: Path, expected: Header) -> None:
