@@ -252,10 +252,15 @@ def material(name: str) -> Nodes:
     return Nodes(bpy.data.materials.new(name))
 
 
+def dimmed(colour: Colour, factor: float) -> Colour:
+    """The colour, darker."""
+    return colour[0] * factor, colour[1] * factor, colour[2] * factor
+
+
 def plain(name: str, colour: Colour, roughness: float = 0.5, **inputs: Any) -> Any:
     """One colour, a little uneven."""
     n = material(name)
-    uneven = n.ramp(n.noise((30, 30, 30)), [(0.25, tuple(0.82 * c for c in colour)), (0.75, colour)])  # type: ignore[list-item]
+    uneven = n.ramp(n.noise((30, 30, 30)), [(0.25, dimmed(colour, 0.82)), (0.75, colour)])
     return n.surface(n.principled(Base_Color=uneven, Roughness=roughness, **inputs))
 
 
@@ -275,8 +280,8 @@ def wood(name: str, dark: Colour, light: Colour, roughness: float, scale: float 
     )
     fibres = n.noise((5 * scale, 190 * scale, 190 * scale), 5.0, 0.7)
     blotches = n.noise((3 * scale, 9 * scale, 9 * scale), 3.0)
-    middle = tuple((a + b) / 2 for a, b in zip(dark, light, strict=True))
-    colour = n.ramp(rings, [(0.0, dark), (0.5, middle), (1.0, light)])  # type: ignore[list-item]
+    middle = ((dark[0] + light[0]) / 2, (dark[1] + light[1]) / 2, (dark[2] + light[2]) / 2)
+    colour = n.ramp(rings, [(0.0, dark), (0.5, middle), (1.0, light)])
     colour = n.mix(0.75, colour, n.ramp(fibres, [(0.3, (0.45, 0.42, 0.4)), (0.62, (1.0, 1.0, 1.0))]), "MULTIPLY")
     colour = n.mix(0.5, colour, n.ramp(blotches, [(0.3, (0.55, 0.5, 0.46)), (0.65, (1.0, 1.0, 1.0))]), "MULTIPLY")
     gloss = n.math("ADD", n.math("MULTIPLY", fibres, 0.25), roughness - 0.12)
@@ -422,7 +427,7 @@ def book_cover(name: str, colour: Colour) -> Any:
     spine = n.math("LESS_THAN", n.axis(1), -0.0600)
     panel = n.math("MULTIPLY", panel, n.math("MULTIPLY", middle, spine))
     gilt = n.math("MAXIMUM", gilt, n.math("MULTIPLY", letters, panel))
-    worn = n.ramp(n.noise((60, 60, 60), 5.0, 0.7), [(0.3, tuple(0.6 * c for c in colour)), (0.75, colour)])  # type: ignore[list-item]
+    worn = n.ramp(n.noise((60, 60, 60), 5.0, 0.7), [(0.3, dimmed(colour, 0.6)), (0.75, colour)])
     cloth = n.principled(Base_Color=worn, Roughness=0.62, Normal=n.bump(n.noise((900, 900, 900), 1.0), 0.3, 0.0006))
     gold = n.principled(Base_Color=(0.83, 0.58, 0.24), Metallic=1.0, Roughness=0.3)
     return n.surface(n.add("ShaderNodeMixShader", {0: gilt, 1: cloth, 2: gold}))
@@ -532,17 +537,17 @@ class Branches:
             for _ in range(self.rng.integers(1, 4)):
                 facing = direction + self.rng.normal(0, 0.75, 3) + np.array([0, -0.35, 0])
                 facing /= np.linalg.norm(facing)
-                mesh = self.blossoms[self.rng.integers(len(self.blossoms))]
+                mesh = self.blossoms[int(self.rng.integers(len(self.blossoms)))]
                 place(mesh, aimed(centre + facing * 0.009, facing, self.rng.uniform(0, 6.3), self.rng.uniform(0.8, 1.12)))
         if self.rng.random() < 0.55:
             facing = direction + self.rng.normal(0, 0.5, 3)
             facing /= np.linalg.norm(facing)
-            mesh = self.buds[self.rng.integers(len(self.buds))]
+            mesh = self.buds[int(self.rng.integers(len(self.buds)))]
             place(mesh, aimed(centre + facing * 0.008, facing, 0.0, self.rng.uniform(0.7, 1.1)))
         for _ in range(self.rng.integers(0, 3)):
             facing = direction + self.rng.normal(0, 0.7, 3)
             facing /= np.linalg.norm(facing)
-            mesh = self.leaves[self.rng.integers(len(self.leaves))]
+            mesh = self.leaves[int(self.rng.integers(len(self.leaves)))]
             place(mesh, aimed(centre, facing, self.rng.uniform(0, 6.3), self.rng.uniform(0.5, 1.0)))
 
     def finish(self) -> None:
@@ -653,7 +658,7 @@ def jug() -> None:
     thing.modifiers.new("smooth", "SUBSURF").render_levels = 1
 
 
-def lemon(seed: int) -> Any:
+def lemon(seed: int) -> Shape:
     """One whole lemon along z, 78 mm long."""
     rng = np.random.default_rng(seed)
     profile = spline(
@@ -1010,29 +1015,40 @@ def foliage(rng: Rng, count: int, size: float, leaf_material: Any) -> Any:
 
 
 def garden(rng: Rng) -> None:
-    """Lawn, flower bed, shrubs, two trees, a hedge, and hills in the haze."""
+    """Lawn, shrubs, hedge, a bed of flowers, trees, and hills in the haze."""
+    lawn(rng)
+    greens = [
+        leafy("shrub a", (0.07, 0.15, 0.02), (0.22, 0.33, 0.05), 0.5, 0.5),
+        leafy("shrub b", (0.11, 0.18, 0.025), (0.33, 0.38, 0.07), 0.5, 0.5),
+        leafy("shrub c", (0.045, 0.11, 0.03), (0.13, 0.23, 0.06), 0.45, 0.5),
+    ]
+    shrubbery(rng, greens)
+    flower_bed(rng, greens[1])
+    trees(rng)
+    hills()
+
+
+def lawn(rng: Rng) -> None:
+    """Rough ground under tufts of grass."""
     soil = material("lawn")
     colour = soil.ramp(soil.noise((0.9, 0.9, 0.9), 5.0, 0.6), [(0.35, (0.060, 0.105, 0.018)), (0.65, (0.125, 0.175, 0.032))])
-    lawn = soil.surface(soil.principled(Base_Color=colour, Roughness=0.9))
+    earth = soil.surface(soil.principled(Base_Color=colour, Roughness=0.9))
     ground = Shape()
     ground.grid(np.array([[[-60, 2, GROUND], [60, 2, GROUND]], [[-60, 120, GROUND], [60, 120, GROUND]]], float))
-    place(ground.mesh("ground", [lawn]))
+    place(ground.mesh("ground", [earth]))
     tuft = blades(rng, 1400, 1.0, 0.055, leafy("grass", (0.08, 0.17, 0.015), (0.30, 0.40, 0.06), 0.5, 0.3))
     for row in range(5, 14):
         half = int(0.4 * row) + 2
         for column in range(-half, half + 1):
             place(tuft, pose((column + rng.uniform(-0.1, 0.1), row, GROUND), yaw=90 * int(rng.integers(4))))
 
-    greens = [
-        leafy("shrub a", (0.07, 0.15, 0.02), (0.22, 0.33, 0.05), 0.5, 0.5),
-        leafy("shrub b", (0.11, 0.18, 0.025), (0.33, 0.38, 0.07), 0.5, 0.5),
-        leafy("shrub c", (0.045, 0.11, 0.03), (0.13, 0.23, 0.06), 0.45, 0.5),
-    ]
+
+def shrubbery(rng: Rng, greens: Sequence[Any]) -> None:
+    """A wood beyond the garden, a hedge before it, and a few shrubs on the lawn."""
     shrubs = [foliage(rng, 1500, 0.13, green) for green in greens]
     fine = [foliage(rng, 1500, 0.075, green) for green in greens]
     hazy = leafy("wood beyond", (0.24, 0.33, 0.16), (0.50, 0.56, 0.30), 0.5, 0.4)
     wood_beyond = foliage(rng, 1500, 0.10, hazy)
-    # A wood beyond the garden, then hedge and shrubs behind the lawn.
     for _ in range(60):
         x, y = rng.uniform(-15, 15), rng.uniform(20, 27)
         size = rng.uniform(1.3, 2.3)
@@ -1054,7 +1070,9 @@ def garden(rng: Rng) -> None:
     ):
         place(fine[int(rng.integers(3))], pose((x, y, GROUND + 0.55 * size), yaw=rng.uniform(0, 360), scale=size))
 
-    # A bed of flowers: heads on stalks, seen as points of colour.
+
+def flower_bed(rng: Rng, green: Any) -> None:
+    """Heads on stalks, seen as points of colour, in longer grass."""
     heads = []
     for name, base, tip in (
         ("poppy", (0.50, 0.02, 0.01), (0.78, 0.06, 0.02)),
@@ -1066,7 +1084,7 @@ def garden(rng: Rng) -> None:
         for k in range(6):
             head.grid(turned(petal(0.05, 0.045, 0.5, 0.05, 3, 4), 60 * k))
         head.tube(np.array([[0.01, 0.02, -0.45], [0.0, 0.0, -0.2], [0, 0, 0]]), 0.005, sides=4, slot=1)
-        heads.append(head.mesh(name, [leafy(name, base, tip, 0.4, 0.3), greens[1]]))
+        heads.append(head.mesh(name, [leafy(name, base, tip, 0.4, 0.3), green]))
     for _ in range(230):
         x, y = rng.uniform(-4.5, 4.5), rng.normal(7.6, 0.5)
         kind = int(np.clip((math.sin(1.7 * x) + rng.normal(0, 0.5)) * 1.4 + 1.8, 0, 3))
@@ -1079,13 +1097,16 @@ def garden(rng: Rng) -> None:
                 scale=rng.uniform(0.7, 1.3),
             ),
         )
-    bed = blades(rng, 500, 1.0, 0.30, greens[1])
+    bed = blades(rng, 500, 1.0, 0.30, green)
     for x in range(-5, 6):
         for y in (7.1, 7.9):
             place(bed, pose((x, y, GROUND), yaw=90 * int(rng.integers(4))))
 
+
+def trees(rng: Rng) -> None:
+    """Four trees in young leaf."""
     bark = plain("trunk", (0.10, 0.07, 0.05), 0.9)
-    crown = [foliage(rng, 1100, 0.15, leafy("crown", (0.10, 0.19, 0.02), (0.34, 0.42, 0.07), 0.5, 0.5))]
+    crown = foliage(rng, 1100, 0.15, leafy("crown", (0.10, 0.19, 0.02), (0.34, 0.42, 0.07), 0.5, 0.5))
     for x, y, height, count in ((-3.3, 11.0, 2.6, 16), (2.1, 11.8, 2.3, 15), (5.4, 12.8, 2.8, 14), (-6.0, 13.0, 3.0, 14)):
         trunk = Shape()
         base = np.array([x, y, GROUND])
@@ -1095,15 +1116,19 @@ def garden(rng: Rng) -> None:
             sides=9,
         )
         for angle in rng.uniform(0, 6.3, 5):
-            fork = np.array([0, 0, 0.55 * height])
-            reach = np.array([math.cos(angle) * 0.9, math.sin(angle) * 0.9, height + rng.uniform(-0.2, 0.3)])
-            trunk.tube(base + spline([fork, (fork + reach) / 2 + [0, 0, 0.15], reach]), np.linspace(0.06, 0.02, 25), sides=6)
+            x_tip, y_tip = math.cos(angle) * 0.9, math.sin(angle) * 0.9
+            fork, tip = 0.55 * height, height + rng.uniform(-0.2, 0.3)
+            bend = (x_tip / 2, y_tip / 2, (fork + tip) / 2 + 0.15)
+            trunk.tube(base + spline([(0, 0, fork), bend, (x_tip, y_tip, tip)]), np.linspace(0.06, 0.02, 25), sides=6)
         place(trunk.mesh("trunk", [bark]))
         for _ in range(count):
             spot = base + np.array([rng.normal(0, 0.75), rng.normal(0, 0.6), height + rng.normal(0.1, 0.5)])
-            place(crown[0], pose(spot, yaw=rng.uniform(0, 360), scale=rng.uniform(0.4, 0.75)))
+            place(crown, pose(spot, yaw=rng.uniform(0, 360), scale=rng.uniform(0.4, 0.75)))
 
-    for distance, rise, colour_hill, seed in (
+
+def hills() -> None:
+    """Three ridges, paler with distance."""
+    for distance, rise, colour, seed in (
         (45, 2.2, (0.16, 0.24, 0.10), 1),
         (80, 6.0, (0.30, 0.42, 0.36), 2),
         (140, 14.0, (0.48, 0.60, 0.66), 3),
@@ -1111,13 +1136,13 @@ def garden(rng: Rng) -> None:
         shape = Shape()
         x = np.linspace(-1.2 * distance, 1.2 * distance, 200)
         hill = np.random.default_rng(seed)
-        z = rise * (0.75 + 0.25 * np.sin(x / distance * 5 + seed)) + sum(
-            hill.uniform(0.01, 0.03) * rise * np.sin(x / distance * hill.uniform(30, 160) + hill.uniform(0, 6))
-            for _ in range(12)
-        )
+        z = rise * (0.75 + 0.25 * np.sin(x / distance * 5 + seed))
+        for _ in range(12):
+            height = hill.uniform(0.01, 0.03) * rise
+            z = z + height * np.sin(x / distance * hill.uniform(30, 160) + hill.uniform(0, 6))
         top = np.stack([x, 0 * x + distance, z], axis=-1)
         shape.grid(np.stack([top * [1, 1, 0] + [0, 0, GROUND], top]))
-        place(shape.mesh("hill", [plain(f"hill {seed}", colour_hill, 1.0)]))
+        place(shape.mesh("hill", [plain(f"hill {seed}", colour, 1.0)]))
 
 
 def light() -> None:
@@ -1174,7 +1199,7 @@ def near_plants(rng: Rng) -> None:
                 shape.grid(grain @ frame[:3, :3].T + centre)
                 awn = np.array([[0, 0, 0.006], [0.004, 0, 0.018], [0.010, 0, 0.034]]) @ frame[:3, :3].T + centre
                 if index % 2 == 0:
-                    shape.tube(awn @ np.array(Matrix.Rotation(0.0, 3, "Z")), np.array([0.00022, 0.00018, 0.0001]), sides=3)
+                    shape.tube(awn, np.array([0.00022, 0.00018, 0.0001]), sides=3)
         place(shape.mesh("ear", [straw]))
 
 
