@@ -49,6 +49,16 @@ def check_folder(folder: Path) -> None:
         raise OutputError(f"Cannot write to {folder}: {error.strerror}; choose another folder.") from error
 
 
+def check_folder_target(folder: str | os.PathLike[str]) -> Path:
+    """Make sure, before long work, that this folder is there and takes files, or that it can be made. Raises OutputError."""
+    path = Path(folder)
+    existing = path
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    check_folder(existing)
+    return path
+
+
 def make_folder(folder: str | os.PathLike[str]) -> Path:
     """The folder, made with its parents if it is missing, and checked to be writable. Raises OutputError."""
     path = Path(folder)

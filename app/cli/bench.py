@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.cli.common import Verbs, add_verb, check_json_target, write_json
+from app.cli.common import Verbs, add_verb, check_json_target, labelled, write_json
 from app.progress import Progress
 from lfcore.errors import InputError
 
@@ -41,19 +41,19 @@ def run(options: argparse.Namespace) -> int:
     from lfcore.machine import machine
 
     path = options.path or sample_path()
-    names = list(dict.fromkeys(options.models or ["full"]))
-    with Progress("measuring", len(names) + 1, "parts") as bar:
+    models = labelled(options.models or ["full"])
+    with Progress("measuring", len(models) + 1, "parts") as bar:
         ceiling = bench.in_fresh_process(bench.measure_ceiling)
         bar.step()
         speeds = {}
-        for name in names:
-            speeds[name] = bench.in_fresh_process(bench.measure_model, name, path, options.count, ceiling)
+        for label, name in models.items():
+            speeds[label] = bench.in_fresh_process(bench.measure_model, name, path, options.count, ceiling)
             bar.step()
     measured = bench.as_json(machine(), ceiling, speeds)
     if options.viewer:
         from app.viewer import measure_frames
 
-        measured["viewer"] = measure_frames(path, names[0])
+        measured["viewer"] = measure_frames(path, next(iter(models.values())))
     if options.json:
         write_json(measured, options.json)
     if options.json != "-":

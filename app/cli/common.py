@@ -49,6 +49,18 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def labelled(models: list[str]) -> dict[str, str]:
+    """The models by what tables call them: their name, or their file's name without folder and extension.
+
+    Raises InputError where two of them would be called the same.
+    """
+    names = list(dict.fromkeys(models))
+    labels = {Path(name).stem if name.endswith(".safetensors") else name: name for name in names}
+    if len(labels) < len(names):
+        raise InputError("Two of the models would have the same name in the table; rename one of the weight files.")
+    return labels
+
+
 def viewpoint(text: str) -> tuple[float, float]:
     """Parse "U,V"."""
     parts = text.split(",")

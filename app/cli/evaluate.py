@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb, check_json_target, open_with_progress, scenes_in, write_json
+from app.cli.common import Verbs, add_verb, check_json_target, labelled, open_with_progress, scenes_in, write_json
 from app.progress import Progress
-from lfcore.errors import InputError, LfviewError
+from lfcore.errors import LfviewError
 
 if TYPE_CHECKING:
     from lfcore.evaluation import SceneScore
@@ -49,21 +49,19 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Score every scene by every model; scenes that cannot be scored are named, the others still count."""
-    from lfcore.export import make_folder
+    from lfcore.export import check_folder_target
 
     check_json_target(options.json)
+    if options.out:
+        check_folder_target(options.out)
     scenes = scenes_in(options.paths)
-    names = list(dict.fromkeys(options.models or ["full"]))
 
     from lfcore.evaluation import Evaluation, score_table
     from lfcore.machine import machine
     from lfcore.synthesizer import make_synthesizer
 
-    models = {_label(name): make_synthesizer(name) for name in names}
-    if len(models) < len(names):
-        raise InputError("Two of the weight files have the same name; rename one to tell their scores apart.")
-    folder = make_folder(options.out) if options.out else None
-    scores, failures = _score_all(scenes, models, folder)
+    models = {label: make_synthesizer(name) for label, name in labelled(options.models or ["full"]).items()}
+    scores, failures = _score_all(scenes, models, options.out)
     for failure in failures:
         print(failure, file=sys.stderr)
     if not scores:
@@ -79,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _score_all(
-    scenes: list[Path], models: dict[str, Synthesizer], folder: Path | None
+    scenes: list[Path], models: dict[str, Synthesizer], folder: str | None
 ) -> tuple[list[dict[str, SceneScore]], list[str]]:
     """Scores by scene and model, and a sentence for each scene that could not be opened or scored."""
     scores: list[dict[str, SceneScore]] = []
@@ -95,10 +93,10 @@ def _score_all(
 
 
 def _score_scene(
-    path: Path, models: dict[str, Synthesizer], folder: Path | None, taken: set[str], bar: Progress
+    path: Path, models: dict[str, Synthesizer], folder: str | None, taken: set[str], bar: Progress
 ) -> dict[str, SceneScore]:
     from lfcore.evaluation import evaluate_scene, scene_figure
-    from lfcore.export import write_picture
+    from lfcore.export import make_folder, write_picture
 
     light_field = open_with_progress(path)
     scores: dict[str, SceneScore] = {}
@@ -107,14 +105,9 @@ def _score_scene(
         scores[label] = result.score
         if folder is not None:
             stem = light_field.name if len(models) == 1 else f"{light_field.name} {label}"
-            write_picture(folder / f"{_unused(stem, taken)}.png", scene_figure(light_field, result))
+            write_picture(make_folder(folder) / f"{_unused(stem, taken)}.png", scene_figure(light_field, result))
         bar.step()
     return scores
-
-
-def _label(model: str) -> str:
-    """What a model is called in tables: its name, or its file's name without folder."""
-    return Path(model).stem if model.endswith(".safetensors") else model
 
 
 def _unused(stem: str, taken: set[str]) -> str:

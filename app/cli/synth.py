@@ -43,7 +43,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Synthesize and write."""
-    from lfcore.export import IMAGE_EXTENSIONS, check_target, make_folder
+    from lfcore.export import IMAGE_EXTENSIONS, check_folder_target, check_target
     from lfcore.lightfield import check_viewpoint, is_extrapolated
 
     u, v = options.uv
@@ -51,13 +51,13 @@ def run(options: argparse.Namespace) -> int:
     out = check_target(options.out, IMAGE_EXTENSIONS)
     if options.disparity:
         check_target(options.disparity, (".exr", ".tif", ".tiff", ".png"))
+    if options.warped:
+        check_folder_target(options.warped)
 
     from lfcore.synthesizer import make_synthesizer
 
     synthesizer = make_synthesizer(options.model)
     light_field = open_with_progress(options.path, options.views)
-    if options.warped:
-        make_folder(options.warped)
     with Progress("synthesizing", 1):
         synthesizer.set_light_field(light_field)
         synthesis = synthesizer.synthesize(u, v)
