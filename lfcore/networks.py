@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
@@ -17,7 +17,7 @@ class ModelConfig:
     """What a weight file must match. `full` is the paper's pair of networks to the letter."""
 
     name: str = "full"
-    levels: Levels = Levels()
+    levels: Levels = field(default_factory=Levels)
 
 
 class PaperStack(nn.Module):

@@ -143,7 +143,7 @@ def _axis_shift(shift: float, start: int, stop: int, size: int) -> _AxisShift | 
 
 
 def _shift(image: Tensor, down: _AxisShift, across: _AxisShift) -> Tensor:
-    """The valid part of `image` (B, H, W) shifted: four taps along x in all rows that the four taps along y need, then those."""
+    """The valid part of `image` (B, H, W) shifted: four taps along x in all rows that the taps along y need, then those."""
     h = down.window.stop - down.window.start
     w = across.window.stop - across.window.start
     source = _edge_slice(_edge_slice(image, -2, down.first, h + 3), -1, across.first, w + 3)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
@@ -126,6 +128,7 @@ class NetworkSynthesizer:
         return self._dtype
 
     def set_light_field(self, light_field: LightField) -> None:
+        """See Synthesizer."""
         self._corners = corner_tensor(light_field)
         self._luma = luminance(self._corners).unsqueeze(1)
 
@@ -177,7 +180,7 @@ class NetworkSynthesizer:
 
 
 class MeanSynthesizer:
-    """The average of the four corners, weighted by nearness to (u, v): what any real synthesis has to beat."""
+    """The plain average of the four corners: what any real synthesis has to beat."""
 
     name = "mean"
     key = "mean"
@@ -242,20 +245,15 @@ def tiles(height: int, width: int, tile: tuple[int, int]) -> Iterator[tuple[Wind
 def _spans(size: int, most: int) -> list[tuple[int, int]]:
     count = -(-size // most)
     edges = [size * k // count for k in range(count + 1)]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(edges))
 
 
+@cache
 def fastest_dtype() -> torch.dtype:
     """bfloat16 where a convolution gains from it on this machine, else float32: measured once per process, in about 50 ms."""
-    global _fastest
-    if _fastest is None:
-        seconds = {dtype: _time_convolution(dtype) for dtype in (torch.float32, torch.bfloat16)}
-        # Less than a fifth gained is not worth the lost digits.
-        _fastest = torch.bfloat16 if seconds[torch.bfloat16] < 0.8 * seconds[torch.float32] else torch.float32
-    return _fastest
-
-
-_fastest: torch.dtype | None = None
+    seconds = {dtype: _time_convolution(dtype) for dtype in (torch.float32, torch.bfloat16)}
+    # Less than a fifth gained is not worth the lost digits.
+    return torch.bfloat16 if seconds[torch.bfloat16] < 0.8 * seconds[torch.float32] else torch.float32
 
 
 def _time_convolution(dtype: torch.dtype) -> float:

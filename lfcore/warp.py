@@ -70,7 +70,7 @@ class _CubicSample(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx, image: Tensor, x: Tensor, y: Tensor) -> Tensor:  # type: ignore[no-untyped-def, override]
+    def forward(ctx, image: Tensor, x: Tensor, y: Tensor) -> Tensor:  # type: ignore[no-untyped-def]
         n, c, height, width = image.shape
         _, h, w = x.shape
         inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)  # (N, h, w); False for NaN
@@ -106,7 +106,7 @@ class _CubicSample(torch.autograd.Function):
         return out.permute(0, 3, 1, 2)
 
     @staticmethod
-    def backward(ctx, grad: Tensor):  # type: ignore[no-untyped-def, override]
+    def backward(ctx, grad: Tensor):  # type: ignore[no-untyped-def]
         d_dx, d_dy = ctx.saved_tensors  # (N, h, w, C)
         grad = grad.permute(0, 2, 3, 1)
         return None, (grad * d_dx).sum(-1), (grad * d_dy).sum(-1)

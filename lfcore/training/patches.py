@@ -69,15 +69,15 @@ def sample_group(
     scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels, rng: np.random.Generator
 ) -> PatchGroup:
     """Draw one group. The same `rng` state gives the same group."""
-    u, v = _draw_viewpoint(scenes[rng.integers(len(scenes))], rng)
+    u, v = _draw_viewpoint(scenes[int(rng.integers(len(scenes)))], rng)
     eligible = [scene for scene in scenes if _spacings(scene, u, v)]
     reach = margin(levels)
     before_y, before_x, after_y, after_x = _draw_margins(reach, config.edge_share, rng)
     shape = before_y + config.size + after_y, before_x + config.size + after_x
     window = Window(before_y, before_y + config.size, before_x, before_x + config.size)
-    patches = []
+    patches: list[FloatArray] = []
     while len(patches) < config.group:
-        scene = eligible[rng.integers(len(eligible))]
+        scene = eligible[int(rng.integers(len(eligible)))]
         views = _draw_views(scene, u, v, shape, levels, config, rng)
         if views is not None:
             patches.append(_draw_tone(views, config.tone_share, rng))
@@ -123,7 +123,8 @@ def _draw_views(
     row0 = int(rng.integers(field.rows - spacing))
     column0 = int(rng.integers(field.columns - spacing))
     shear = _draw_shear(scene, spacing, levels, config.shear_spread, rng)
-    steps = [(round(q * spacing), round(p * spacing)) for p, q in (*CORNERS, (u, v))]  # (row, column) in the sub-grid
+    corners = [(int(q) * spacing, int(p) * spacing) for p, q in CORNERS]
+    steps = [*corners, (int(v * spacing), int(u * spacing))]  # (row, column) in the sub-grid
 
     # Content that sits at x in view c is found at x + m c in the crop that starts at x0 - m c: its disparity grows by m k.
     reach = abs(shear) * spacing
