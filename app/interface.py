@@ -1,0 +1,164 @@
+"""One frame of the program: the picture by the canvas, the panels over it. The same in a window and off screen."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import moderngl
+import numpy as np
+from imgui_bundle import imgui
+
+from app import panels, theme
+from app.canvas import Canvas, Frame, Target
+from app.commands import Action, OpenPath, Request
+from app.controller import Controller
+from app.engine import Answer
+from app.layout import Layout
+from app.state import Look, Placement, Rect, place
+from assets import sample_path
+from lfcore.errors import LfviewError
+from lfcore.lightfield import CORNERS, LightField
+
+GLSL_VERSION = "#version 330 core"
+DIMMED = 0.35
+
+
+class Interface:
+    """Draws frames into a framebuffer. Belongs to the thread on which the GL context and the imgui context are current."""
+
+    def __init__(self, controller: Controller, context: moderngl.Context, scale: float) -> None:
+        self.controller = controller
+        self.closing = False
+        self._canvas = Canvas(context)
+        self._fonts = theme.apply(scale)
+        self._scale = scale
+        self._light_field: LightField | None = None  # what the canvas has taken
+        self._answer: Answer | None = None
+        self._captured: int | None = None
+        self._picture_ms: float | None = None
+        imgui.backends.opengl3_init(GLSL_VERSION)
+
+    def set_scale(self, scale: float) -> None:
+        """Go to another content scale of text."""
+        if scale != self._scale:
+            self._scale = scale
+            theme.change_scale(scale)
+
+    def draw(self, target: Target, now: float) -> None:
+        """Draw one frame. imgui's display size and events must have been set (by its platform backend); `now` in seconds."""
+        self.controller.tick(now)
+        imgui.backends.opengl3_new_frame()
+        imgui.new_frame()
+        display = imgui.get_io().display_size
+        state = self.controller.state
+        layout, requests = panels.draw(
+            state, self.controller.readout(self._picture_ms), (display.x, display.y), self._scale, self._fonts
+        )
+        imgui.render()
+        # What the panels changed is drawn in this very frame.
+        for request in requests:
+            self._fulfil(request)
+        self.controller.tick(now)
+        self._synchronise()
+        self._canvas.begin(target)
+        if self._light_field is not None:
+            self._draw_picture(target, layout, target.size[0] / max(display.x, 1.0))
+        target.framebuffer.use()
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+
+    def shutdown(self) -> None:
+        """Give imgui's GL objects back; the context must still be current."""
+        self._canvas.clear()
+        imgui.backends.opengl3_shutdown()
+
+    def _fulfil(self, request: Request) -> None:
+        controller = self.controller
+        if isinstance(request, OpenPath):
+            controller.open(path_from_text(request.text))
+        elif request is Action.OPEN_SAMPLE:
+            controller.open(sample_path())
+        elif request is Action.CLOSE:
+            controller.close()
+        elif request is Action.CANCEL_OPEN:
+            controller.cancel_open()
+        elif request is Action.DISMISS:
+            controller.dismiss()
+        elif request is Action.QUIT:
+            self.closing = True
+
+    def _synchronise(self) -> None:
+        """Hand to the canvas what it has not yet taken."""
+        controller, canvas = self.controller, self._canvas
+        light_field = controller.light_field
+        if light_field is not self._light_field:
+            self._light_field = None
+            self._answer = self._captured = None
+            canvas.clear()
+            if light_field is not None:
+                corners = np.stack([light_field.views[-int(v), -int(u)] for u, v in CORNERS])  # (4, H, W, 3)
+                try:
+                    canvas.set_light_field(corners)
+                except LfviewError as error:
+                    controller.close()
+                    controller.say(str(error))
+                    return
+            self._light_field = light_field
+        if light_field is None:
+            return
+        answer = controller.newest
+        if answer is not None and answer is not self._answer:
+            synthesis = answer.synthesis
+            canvas.set_synthesis(synthesis.image, synthesis.disparity, (synthesis.u, synthesis.v))
+            self._answer = answer
+        captured = controller.captured_here
+        if captured is not None and captured != self._captured:
+            canvas.set_captured(light_field.views[divmod(captured, light_field.columns)])
+            self._captured = captured
+
+    def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
+        """`pixels`: framebuffer pixels per window unit."""
+        frame = self._frame()
+        start = time.perf_counter()
+        if self._canvas.prepare(frame):
+            self._canvas.finish()
+            self._picture_ms = 1e3 * (time.perf_counter() - start)
+        area = layout.picture
+        placement = place(self.controller.state.zoom, self._canvas.picture_size(frame.look), area)
+        self._canvas.draw(
+            frame,
+            target,
+            Rect(area.x * pixels, area.y * pixels, area.width * pixels, area.height * pixels),
+            Placement(placement.scale * pixels, (placement.origin[0] * pixels, placement.origin[1] * pixels)),
+        )
+
+    def _frame(self) -> Frame:
+        """What the picture is to show; dimmed where the chosen look has nothing to show here."""
+        controller = self.controller
+        state = controller.state
+        look, dim = state.look, 1.0
+        if look is Look.ERROR and controller.captured_here is None:
+            look, dim = Look.SYNTHESIS, DIMMED
+        if look.needs_disparity and not self._canvas.has_disparity:
+            look, dim = Look.SYNTHESIS, DIMMED
+        return Frame(
+            look,
+            controller.viewpoint,
+            full_share=controller.full_share,
+            captured=state.captured and controller.captured_here is not None,
+            display_tone=state.display_tone,
+            gain=state.gain,
+            disparity_range=controller.disparity_range or (0.0, 1.0),
+            dim=dim,
+        )
+
+
+def path_from_text(text: str) -> Path:
+    """The path that was typed, pasted or dropped: quotes, file:// and ~ are understood."""
+    text = text.strip()
+    if len(text) >= 2 and text[0] == text[-1] and text[0] in "'\"":
+        text = text[1:-1]
+    if text.startswith("file://"):
+        text = unquote(urlparse(text).path)
+    return Path(text).expanduser()

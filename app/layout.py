@@ -1,0 +1,31 @@
+"""Where the parts of the window lie, for any size of it and any scale of its text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.state import Rect
+
+PANEL_WIDTH = 296.0
+STATUS_HEIGHT = 30.0
+PICTURE_LEAST = 320.0  # narrower than this beside the panel, the picture takes the panel's room
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The parts of the window, in its units; the panel is None where it is not wanted or has no room."""
+
+    picture: Rect
+    panel: Rect | None
+    status: Rect
+
+
+def lay_out(width: float, height: float, scale: float, panel_wanted: bool) -> Layout:
+    """Divide a window of that size; `scale` multiplies every length that holds text."""
+    status_height = min(round(STATUS_HEIGHT * scale), height / 2)
+    panel_width = round(PANEL_WIDTH * scale)
+    upper = height - status_height
+    status = Rect(0, upper, width, status_height)
+    if not panel_wanted or width < panel_width + PICTURE_LEAST * scale or upper < PICTURE_LEAST / 2 * scale:
+        return Layout(Rect(0, 0, width, upper), None, status)
+    return Layout(Rect(0, 0, width - panel_width, upper), Rect(width - panel_width, 0, panel_width, upper), status)

@@ -1,0 +1,30 @@
+"""How the program comes by light fields and models; both are imported when first asked for, since they are slow to load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lfcore.lightfield import LightField
+
+if TYPE_CHECKING:
+    from lfcore.synthesizer import Synthesizer
+
+
+def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> LightField:
+    """Open any light field that lfcore can read."""
+    from lfcore.formats import open_light_field
+
+    return open_light_field(path, progress=progress, cancelled=cancelled)
+
+
+def synthesizer_factory(model: str) -> Callable[[], Synthesizer]:
+    """What makes the synthesizer of the named model or weight file when called."""
+
+    def make() -> Synthesizer:
+        from lfcore.synthesizer import make_synthesizer
+
+        return make_synthesizer(model)
+
+    return make

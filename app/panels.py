@@ -1,0 +1,54 @@
+"""The interface over the view state, in imgui: no GL, no torch.
+
+`draw` lays out one frame: it changes the ViewState by mouse and keys, and returns what the program is asked to do.
+"""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app import keyboard, overlays, picture, sidebar, statusbar, theme
+from app.commands import Context, Request
+from app.layout import Layout, lay_out
+from app.state import Grid, Look, Readout, Size, ViewState, place
+
+_NO_PICTURE: Size = (1, 1)
+
+
+def draw(
+    state: ViewState, readout: Readout, window: tuple[float, float], scale: float, fonts: theme.Fonts
+) -> tuple[Layout, list[Request]]:
+    """Draw everything but the picture itself, between imgui's new_frame and render.
+
+    window: (width, height) in imgui's units. scale: content scale of text. Returns the layout, in which the caller draws
+    the picture, and the requests.
+    """
+    layout = lay_out(*window, scale, state.panel and readout.grid is not None)
+    size = picture_size(readout.grid, state.look)
+    area = layout.picture
+    context = Context(state, readout.grid, size, area, readout.loading is not None, bool(readout.messages))
+    keyboard.run_pressed(context)
+    state.dragging = state.dragging and imgui.is_mouse_down(0)
+    size = picture_size(readout.grid, state.look)
+    if readout.grid is not None:
+        picture.draw(area, state, size, scale)
+        overlays.notices(area, state, readout)
+        overlays.legend(area, state, readout)
+        overlays.missing(area, context, readout)
+    elif readout.loading is None:
+        overlays.start(area, context, fonts)
+    if layout.panel is not None:
+        sidebar.draw(layout.panel, context, readout, fonts)
+    statusbar.draw(layout.status, state, readout, place(state.zoom, size, area).scale)
+    overlays.loading(area, context, readout)
+    overlays.path_field(area, context)
+    overlays.key_page(area, context, fonts)
+    overlays.messages(area, context, readout)
+    return layout, context.requests
+
+
+def picture_size(grid: Grid | None, look: Look) -> Size:
+    """(width, height) in pixels of what the look shows of a light field with this grid."""
+    if grid is None:
+        return _NO_PICTURE
+    return (2 * grid.width, 2 * grid.height) if look is Look.WARPED_ALL else (grid.width, grid.height)

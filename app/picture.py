@@ -1,0 +1,52 @@
+"""The mouse in the picture: dragging moves the viewpoint or the picture, the wheel zooms."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+
+from app.state import Look, Rect, Size, ViewState, pan_by, place, zoom_about
+from app.widgets import FIXED, window
+
+# Window units (at scale 1) of a drag from corner view to corner view.
+DRAG_SPAN = 360.0
+WHEEL_STEP = 1.2
+
+
+def draw(area: Rect, state: ViewState, picture: Size, scale: float) -> None:
+    """The invisible window over the picture that takes the mouse."""
+    flags = FIXED | imgui.WindowFlags_.no_background.value | imgui.WindowFlags_.no_scroll_with_mouse.value
+    with window("picture", area, flags, padding=ImVec2(0, 0)):
+        buttons = (
+            imgui.ButtonFlags_.mouse_button_left.value
+            | imgui.ButtonFlags_.mouse_button_right.value
+            | imgui.ButtonFlags_.mouse_button_middle.value
+        )
+        imgui.invisible_button("canvas", ImVec2(area.width, area.height), buttons)
+        hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
+    io = imgui.get_io()
+    mouse = (io.mouse_pos.x, io.mouse_pos.y)
+    if active:
+        _drag(state, (io.mouse_delta.x, io.mouse_delta.y), picture, area, scale)
+    if hovered and io.mouse_wheel:
+        state.zoom = zoom_about(state.zoom, WHEEL_STEP**io.mouse_wheel, mouse, picture, area)
+    state.cursor = _under(mouse, state, picture, area) if hovered else None
+
+
+def _drag(state: ViewState, delta: tuple[float, float], picture: Size, area: Rect, scale: float) -> None:
+    moves_picture = not imgui.is_mouse_down(0) or imgui.is_key_down(imgui.Key.space)
+    if moves_picture:
+        if delta != (0.0, 0.0):
+            state.zoom = pan_by(state.zoom, delta, picture, area)
+        return
+    # u is the camera's own position to the right, so to turn the scene to the right the camera goes to the left.
+    state.drag_by(-delta[0] / (DRAG_SPAN * scale), -delta[1] / (DRAG_SPAN * scale))
+
+
+def _under(mouse: tuple[float, float], state: ViewState, picture: Size, area: Rect) -> tuple[float, float] | None:
+    """The pixel of the light field's views under the mouse, or None beside the picture."""
+    x, y = place(state.zoom, picture, area).to_picture(mouse)
+    if not (0 <= x < picture[0] and 0 <= y < picture[1]):
+        return None
+    if state.look is Look.WARPED_ALL:
+        return x % (picture[0] / 2), y % (picture[1] / 2)
+    return x, y

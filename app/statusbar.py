@@ -1,0 +1,108 @@
+"""The line at the bottom: which step is on screen and how long it took, the cache, the viewpoint, what is under the cursor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app import theme
+from app.state import STEP_MEANING, Readout, Rect, Step, ViewState
+from app.widgets import em, milliseconds, number, packed, text, tooltip, window
+
+STEP_COLOURS = {
+    Step.BLEND: theme.TEXT_FAINT,
+    Step.INSTANT: theme.WARNING,
+    Step.FULL: theme.ACCENT,
+    Step.CAPTURED: theme.GOOD,
+}
+
+
+@dataclass(frozen=True)
+class _Part:
+    words: str
+    hint: str
+    colour: ImVec4 = theme.TEXT_SOFT
+
+
+def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float) -> None:
+    """The line; parts that find no room are left out, the least important first."""
+    pad = em() * 0.8
+    with window("status", rect, padding=ImVec2(pad, 0)):
+        y = (rect.height - em()) / 2
+        imgui.set_cursor_pos(ImVec2(pad, y))
+        right = rect.width - pad
+        if readout.grid is None:
+            text(_idle_words(readout), theme.TEXT_SOFT)
+            return
+        left = _step(state, readout, pad, y)
+        gap = em() * 1.6
+        for part in reversed(_right_parts(state, readout, zoom)):
+            width = imgui.calc_text_size(part.words).x
+            if right - width < left + gap:
+                break
+            right -= width
+            _put(part, right, y)
+            right -= gap
+        for part in _left_parts(readout):
+            width = imgui.calc_text_size(part.words).x
+            if left + gap + width > right:
+                break
+            _put(part, left + gap, y)
+            left += gap + width
+
+
+def _idle_words(readout: Readout) -> str:
+    return "Opening" if readout.loading is not None else "Nothing is open"
+
+
+def _step(state: ViewState, readout: Readout, x: float, y: float) -> float:
+    """The step on screen with its dot; returns where it ends."""
+    step = readout.step
+    words = step.value
+    if readout.step_ms is not None:
+        words += f"  {milliseconds(readout.step_ms)}"
+    if readout.from_cache:
+        words += " (cached)"
+    corner = imgui.get_window_pos()
+    radius = em() * 0.28
+    middle = ImVec2(corner.x + x + radius, corner.y + y + em() / 2)
+    imgui.get_window_draw_list().add_circle_filled(middle, radius, packed(STEP_COLOURS[step]))
+    start = x + 2 * radius + em() * 0.5
+    _put(_Part(words, f"The step on screen: {STEP_MEANING[step]}.", theme.TEXT), start, y)
+    return start + imgui.calc_text_size(words).x
+
+
+def _left_parts(readout: Readout) -> list[_Part]:
+    parts = []
+    if readout.busy:
+        parts.append(_Part(readout.busy, "What the synthesis thread is doing now"))
+    parts.append(_Part(f"model {readout.model}", "The model that synthesizes"))
+    used, limit = readout.cache_bytes / 2**20, readout.cache_limit / 2**20
+    parts.append(
+        _Part(
+            f"cache {used:.0f} of {limit:.0f} MiB, {len(readout.cached)} views, {readout.cache_hits} hits",
+            "Viewpoints seen before are kept in memory and shown at once",
+        )
+    )
+    return parts
+
+
+def _right_parts(state: ViewState, readout: Readout, zoom: float) -> list[_Part]:
+    parts = []
+    if state.cursor is not None:
+        x, y = int(state.cursor[0]), int(state.cursor[1])
+        words = f"x {x}  y {y}"
+        if readout.disparity_under_cursor is not None and readout.grid is not None:
+            per_view = readout.disparity_under_cursor / (readout.grid.columns - 1)
+            words += f"  D {number(readout.disparity_under_cursor, 2)} px, {number(per_view, 2)} per view"
+        parts.append(_Part(words, "Pixel under the cursor, and its disparity: over the baseline, and per captured view"))
+    parts.append(_Part(f"{100 * zoom:.0f} %", "Screen pixels per picture pixel"))
+    parts.append(_Part(f"(u, v)  {number(state.u, 3)}  {number(state.v, 3)}", "The viewpoint; corner views at 0 and 1"))
+    return parts
+
+
+def _put(part: _Part, x: float, y: float) -> None:
+    imgui.set_cursor_pos(ImVec2(x, y))
+    text(part.words, part.colour)
+    tooltip(part.hint)

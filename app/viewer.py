@@ -1,0 +1,243 @@
+"""The window and the frame loop: the only place that knows glfw."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+# imgui-bundle brings its own glfw library and tells the glfw package to use that one: it must be imported first, or two
+# copies of glfw would not know of each other's windows.
+from imgui_bundle import imgui
+
+import glfw  # isort: skip
+
+from app import frametimes
+from app.canvas import Target, windowed_context
+from app.controller import Controller
+from app.engine import Engine
+from app.frametimes import FrameTimes
+from app.interface import Interface
+from app.offscreen import measure_frames_offscreen
+from app.opening import open_by_content, synthesizer_factory
+from assets import sample_path
+from lfcore.errors import LfviewError
+
+TITLE = "lfview"
+WINDOW_SIZE = (1280, 800)
+SMALLEST_SIZE = (200, 150)
+MEBIBYTE = 2**20
+
+_SETTLE_FRAMES = 3  # imgui shows the effect of an event up to two frames later
+_HOVER_SECONDS = 0.8  # after the last movement of the mouse, a tooltip may still appear
+_HOVER_INTERVAL = 0.1
+_CARET_INTERVAL = 0.25  # of a blinking caret
+_IDLE_INTERVAL = 0.5  # how long Ctrl-C may have to wait, since Python's signals wait for glfw to return
+
+
+class NoDisplay(LfviewError):
+    """There is no display, or none with OpenGL 3.3."""
+
+
+def run_viewer(path: Path | None, model: str = "full", cache_mib: int = 512) -> int:
+    """Open the window on the light field at `path` (None: the sample) and stay until it is closed. Returns the exit code 0.
+
+    Faults of light fields and models are shown in the window. Raises NoDisplay where there is no display or no OpenGL 3.3.
+    """
+    window = _Window()
+    try:
+        controller = _controller(model, cache_mib)
+        try:
+            window.attach(controller)
+            window.draw()  # the first frame, before anything slow is imported
+            controller.start()
+            controller.open(path if path is not None else sample_path())
+            window.run()
+        finally:
+            controller.stop()
+    finally:
+        window.close()
+    return 0
+
+
+def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTimes:
+    """Frame times on the light field at `path` as `app.frametimes.measure` defines them: in a window, else off screen."""
+    try:
+        window = _Window()
+    except NoDisplay:
+        return measure_frames_offscreen(path, seconds, model)
+    try:
+        controller = _controller(model, 512)
+        try:
+            window.attach(controller)
+            controller.open(path)
+            return frametimes.measure(controller, window.poll_and_draw, seconds, "window")
+        finally:
+            controller.stop()
+    finally:
+        window.close()
+
+
+def _controller(model: str, cache_mib: int) -> Controller:
+    engine = Engine(synthesizer_factory(model), cache_mib * MEBIBYTE)
+    return Controller(engine, open_by_content, wake=glfw.post_empty_event, model=Path(model).name)
+
+
+class _Loader:
+    """Finds GL functions for moderngl through glfw, so that it works with whatever kind of context glfw has made."""
+
+    def load_opengl_function(self, name: str) -> int:
+        return ctypes.cast(glfw.get_proc_address(name), ctypes.c_void_p).value or 0
+
+
+class _Window:
+    """A glfw window with the interface in it."""
+
+    def __init__(self) -> None:
+        glfw.ERROR_REPORTING = "ignore"
+        if not glfw.init():
+            raise NoDisplay(
+                f"Found no display to open a window on ({_glfw_fault()}); start it from a desktop session, or use "
+                f"`lfview synth` and `lfview sweep`, which need none."
+            )
+        glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+        glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+        glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+        glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+        self._window = glfw.create_window(*WINDOW_SIZE, TITLE, None, None)
+        if not self._window:
+            fault = _glfw_fault()
+            glfw.terminate()
+            raise NoDisplay(
+                f"Found no OpenGL 3.3 on this display ({fault}); update the graphics driver, or install Mesa's software "
+                f"renderer (on Debian: libgl1-mesa-dri)."
+            )
+        glfw.set_window_size_limits(self._window, *SMALLEST_SIZE, glfw.DONT_CARE, glfw.DONT_CARE)
+        glfw.make_context_current(self._window)
+        glfw.swap_interval(1)
+        self._context = windowed_context(_Loader())
+        self._target = self._context.detect_framebuffer(0)
+        self._interval = _frame_interval()
+        self._interface: Interface | None = None
+        self._touched_at = 0.0  # last event of mouse or keyboard
+        self._title = TITLE
+        imgui.create_context()
+        imgui.get_io().set_ini_filename("")
+        # Set before imgui sets its own callbacks, which call these.
+        glfw.set_cursor_pos_callback(self._window, self._touched)
+        glfw.set_mouse_button_callback(self._window, self._touched)
+        glfw.set_scroll_callback(self._window, self._touched)
+        glfw.set_key_callback(self._window, self._touched)
+        glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
+        imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
+
+    def attach(self, controller: Controller) -> None:
+        """Show this controller's light field from now on."""
+        self._interface = Interface(controller, self._context, self._scale())
+
+    def run(self) -> None:
+        """Draw frames as they are needed until the window is closed."""
+        frames_due = _SETTLE_FRAMES
+        while not glfw.window_should_close(self._window) and not self._at_hand.closing:
+            started = time.monotonic()
+            if frames_due > 0:
+                frames_due -= 1
+                self.draw()
+            wait = self._wait_seconds(frames_due > 0, started)
+            before = time.monotonic()
+            if wait > 0:
+                glfw.wait_events_timeout(wait)
+            else:
+                glfw.poll_events()
+            if time.monotonic() - before < wait or self._touched_at >= before:
+                frames_due = _SETTLE_FRAMES
+            elif wait < _IDLE_INTERVAL:
+                frames_due = max(frames_due, 1)
+
+    def poll_and_draw(self) -> None:
+        """Take events and draw one frame, until the graphics are done with it."""
+        glfw.poll_events()
+        self.draw()
+        self._context.finish()
+
+    def draw(self) -> None:
+        """Draw a frame and show it."""
+        size = glfw.get_framebuffer_size(self._window)
+        if min(size) == 0:
+            return  # minimised
+        interface = self._at_hand
+        interface.set_scale(self._scale())
+        imgui.backends.glfw_new_frame()
+        interface.draw(Target(self._target, size), time.monotonic())
+        glfw.swap_buffers(self._window)
+        self._name_window(interface.controller)
+
+    def close(self) -> None:
+        """Give the window and everything in it back."""
+        if self._interface is not None:
+            self._interface.shutdown()
+        imgui.backends.glfw_shutdown()
+        imgui.destroy_context()
+        glfw.terminate()
+
+    @property
+    def _at_hand(self) -> Interface:
+        if self._interface is None:
+            raise RuntimeError("the window has no interface yet")
+        return self._interface
+
+    def _wait_seconds(self, more_due: bool, started: float) -> float:
+        """How long to wait for events before the next frame; _IDLE_INTERVAL or more: there is nothing to draw until then."""
+        now = time.monotonic()
+        to_next_frame = max(started + self._interval - now, 0.0)
+        if more_due:
+            return to_next_frame
+        waits = [_IDLE_INTERVAL]
+        due_in = self._at_hand.controller.next_frame_in
+        if due_in is not None:
+            waits.append(max(due_in, to_next_frame))
+        if now - self._touched_at < _HOVER_SECONDS:
+            waits.append(_HOVER_INTERVAL)
+        if imgui.get_io().want_text_input:
+            waits.append(_CARET_INTERVAL)
+        return min(waits)
+
+    def _scale(self) -> float:
+        """Content scale in imgui's units, which on some systems are scaled already."""
+        content = max(glfw.get_window_content_scale(self._window))
+        width = max(glfw.get_window_size(self._window)[0], 1)
+        return content * width / max(glfw.get_framebuffer_size(self._window)[0], 1) or 1.0
+
+    def _name_window(self, controller: Controller) -> None:
+        light_field = controller.light_field
+        title = TITLE if light_field is None else f"{light_field.name} \N{EN DASH} {TITLE}"
+        if title != self._title:
+            self._title = title
+            glfw.set_window_title(self._window, title)
+
+    def _touched(self, *_: object) -> None:
+        self._touched_at = time.monotonic()
+
+    def _dropped(self, _: object, paths: Sequence[str]) -> None:
+        """Open the first of the files or folders dropped on the window."""
+        self._touched_at = time.monotonic()
+        if paths:
+            self._at_hand.controller.open(Path(paths[0]))
+
+
+def _glfw_fault() -> str:
+    _, description = glfw.get_error()
+    if isinstance(description, bytes):
+        description = description.decode("utf-8", "replace")
+    return description or "no reason given"
+
+
+def _frame_interval() -> float:
+    """The least time between two frames: a little less than the monitor's, so that waiting for the monitor sets the pace
+    where it can be waited for."""
+    monitor = glfw.get_primary_monitor()
+    mode = glfw.get_video_mode(monitor) if monitor else None
+    rate = mode.refresh_rate if mode is not None and mode.refresh_rate > 0 else 60
+    return 0.85 / rate

@@ -1,0 +1,54 @@
+"""The (u, v) pad: captured views as dots, cached viewpoints as a trail, the viewpoint on screen as a ring."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+
+from app import theme
+from app.state import Point, Readout, ViewState
+from app.widgets import em, packed, tooltip
+from lfcore.lightfield import EXTRAPOLATION_LIMIT
+
+_SPAN = 1 + 2 * EXTRAPOLATION_LIMIT
+
+
+def draw(state: ViewState, readout: Readout, size: float) -> None:
+    """The pad as a square of `size`; a click or a drag in it moves the viewpoint."""
+    corner = imgui.get_cursor_screen_pos()
+    imgui.invisible_button("viewpoint pad", ImVec2(size, size))
+    if imgui.is_item_active():
+        mouse = imgui.get_mouse_pos()
+        u = (mouse.x - corner.x) / size * _SPAN - EXTRAPOLATION_LIMIT
+        v = (mouse.y - corner.y) / size * _SPAN - EXTRAPOLATION_LIMIT
+        state.drag_to(u, v)
+    if not imgui.is_item_active():
+        tooltip("Click or drag to move the viewpoint. Dots: captured views; blue: in the cache; rim: extrapolated.  (Arrows)")
+
+    def at(point: Point) -> ImVec2:
+        return ImVec2(
+            corner.x + (point[0] + EXTRAPOLATION_LIMIT) / _SPAN * size,
+            corner.y + (point[1] + EXTRAPOLATION_LIMIT) / _SPAN * size,
+        )
+
+    brush = imgui.get_window_draw_list()
+    rounding = imgui.get_style().frame_rounding
+    brush.push_clip_rect(corner, ImVec2(corner.x + size, corner.y + size), True)
+    brush.add_rect_filled(corner, ImVec2(corner.x + size, corner.y + size), packed(theme.BACKGROUND), rounding)
+    brush.add_rect_filled(at((0, 0)), at((1, 1)), packed(theme.FIELD), rounding / 2)
+    brush.add_rect(at((0, 0)), at((1, 1)), packed(theme.FIELD_ACTIVE), rounding / 2)
+    here = at((state.u, state.v))
+    brush.add_line(ImVec2(here.x, corner.y), ImVec2(here.x, corner.y + size), packed(theme.LINE))
+    brush.add_line(ImVec2(corner.x, here.y), ImVec2(corner.x + size, here.y), packed(theme.LINE))
+    for point in readout.cached:
+        brush.add_circle_filled(at(point), em() * 0.17, packed(theme.ACCENT_DEEP))
+    grid = readout.grid
+    if grid is not None:
+        radius = min(em() * 0.14, size / _SPAN / max(grid.rows, grid.columns) * 0.25)
+        for index in range(grid.rows * grid.columns):
+            dark = divmod(index, grid.columns) in grid.dark
+            colour = theme.FIELD_ACTIVE if dark else theme.TEXT_SOFT
+            brush.add_circle_filled(at(grid.position(index)), radius, packed(colour))
+    on_captured = readout.captured_here is not None
+    brush.add_circle_filled(here, em() * 0.3, packed(theme.ACCENT))
+    brush.add_circle(here, em() * 0.3, packed(theme.TEXT if on_captured else theme.BACKGROUND), 0, em() * 0.1)
+    brush.pop_clip_rect()

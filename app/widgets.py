@@ -1,0 +1,214 @@
+"""Small parts that the panels are made of: text in a size, rows with a key beside them, buttons that run a command."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app import commands, theme
+from app.state import Rect
+
+_BARE = (
+    imgui.WindowFlags_.no_decoration.value
+    | imgui.WindowFlags_.no_move.value
+    | imgui.WindowFlags_.no_saved_settings.value
+    | imgui.WindowFlags_.no_nav.value
+)
+FIXED = _BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value
+CARD = _BARE | imgui.WindowFlags_.always_auto_resize.value
+DASH = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+
+def number(value: float, decimals: int) -> str:
+    """A number with a true minus sign, so that columns of them line up."""
+    return f"{value:.{decimals}f}".replace("-", MINUS)
+
+
+def milliseconds(value: float) -> str:
+    """A duration with the digits that matter."""
+    return f"{value:.1f} ms" if value < 10 else f"{value:,.0f} ms".replace(",", "\N{NO-BREAK SPACE}")
+
+
+def em() -> float:
+    """The height of the text: the unit of all spacing that goes with it."""
+    return imgui.get_font_size()
+
+
+@contextmanager
+def window(name: str, rect: Rect, flags: int = FIXED, padding: ImVec2 | None = None) -> Iterator[None]:
+    """A window at a fixed place."""
+    imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
+    imgui.set_next_window_size(ImVec2(rect.width, rect.height))
+    if padding is not None:
+        imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
+    imgui.begin(name, None, flags)
+    if padding is not None:
+        imgui.pop_style_var()
+    try:
+        yield
+    finally:
+        imgui.end()
+
+
+@contextmanager
+def card(name: str, area: Rect, pivot: tuple[float, float], width: float, flags: int = CARD) -> Iterator[None]:
+    """A card over the picture: `pivot` (0 to 1) is where it sits in the area, and which point of it sits there."""
+    margin = em()
+    place = ImVec2(
+        area.x + margin + (area.width - 2 * margin) * pivot[0],
+        area.y + margin + (area.height - 2 * margin) * pivot[1],
+    )
+    imgui.set_next_window_pos(place, pivot=ImVec2(*pivot))
+    width = max(min(width, area.width - 2 * margin), 4 * em())
+    imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, max(area.height - 2 * margin, 3 * em())))
+    imgui.push_style_color(imgui.Col_.window_bg, theme.CARD)
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, em() * 0.45)
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
+    imgui.begin(name, None, flags)
+    imgui.pop_style_var(2)
+    imgui.pop_style_color()
+    try:
+        yield
+    finally:
+        imgui.end()
+
+
+@contextmanager
+def font(face: imgui.ImFont, size: float = theme.FONT_SIZE) -> Iterator[None]:
+    """Text in this face and size (before scaling)."""
+    imgui.push_font(face, size)
+    try:
+        yield
+    finally:
+        imgui.pop_font()
+
+
+def text(words: str, colour: ImVec4 = theme.TEXT) -> None:
+    """A line of text, as it stands."""
+    imgui.push_style_color(imgui.Col_.text, colour)
+    imgui.text_unformatted(words)
+    imgui.pop_style_color()
+
+
+def wrapped(words: str, colour: ImVec4 = theme.TEXT) -> None:
+    """Text broken into lines at the window's edge."""
+    imgui.push_style_color(imgui.Col_.text, colour)
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(words)
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()
+
+
+def heading(words: str, fonts: theme.Fonts) -> None:
+    """The title of a section, with a rule above it."""
+    spacing = imgui.get_style().item_spacing
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, em() * 0.5))
+    imgui.dummy(ImVec2(0, 0))
+    imgui.separator()
+    imgui.pop_style_var()
+    with font(fonts.bold, theme.SMALL):
+        text(words, theme.TEXT_SOFT)
+
+
+def tooltip(words: str) -> None:
+    """Words beside the mouse when it rests on the last control."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip.value):
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(em() * 0.6, em() * 0.45))
+        if imgui.begin_tooltip():
+            imgui.push_text_wrap_pos(em() * 22)
+            imgui.text_unformatted(words)
+            imgui.pop_text_wrap_pos()
+            imgui.end_tooltip()
+        imgui.pop_style_var()
+
+
+def button(label: str, command: str, context: commands.Context, width: float = 0.0) -> None:
+    """A button that runs the named command; its tooltip tells the key."""
+    if imgui.button(f"{label}##{command}", ImVec2(width, 0)):
+        commands.run(command, context)
+    tooltip(commands.COMMANDS[command].tooltip)
+
+
+def row(label: str, command: str, selected: bool, context: commands.Context) -> None:
+    """A row of a list that runs the named command, with the key at its right end."""
+    _choice(label, command, selected, context, imgui.get_content_region_avail().x, theme.PANEL)
+
+
+def tile(label: str, command: str, selected: bool, context: commands.Context, width: float) -> None:
+    """As `row`, but a button of this width."""
+    _choice(label, command, selected, context, width, theme.FIELD)
+
+
+def _choice(label: str, command: str, selected: bool, context: commands.Context, width: float, ground: ImVec4) -> None:
+    height = imgui.get_frame_height()
+    corner = imgui.get_cursor_screen_pos()
+    if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
+        commands.run(command, context)
+    fill = theme.ACCENT_DEEP if selected else theme.FIELD_HOVERED if imgui.is_item_hovered() else ground
+    tooltip(commands.COMMANDS[command].tooltip)
+    brush = imgui.get_window_draw_list()
+    end = ImVec2(corner.x + width, corner.y + height)
+    brush.add_rect_filled(corner, end, packed(fill), imgui.get_style().frame_rounding)
+    pad = em() * 0.55
+    y = corner.y + (height - em()) / 2
+    brush.add_text(ImVec2(corner.x + pad, y), packed(theme.TEXT), label)
+    key = commands.COMMANDS[command].keys[0]
+    x = end.x - pad - imgui.calc_text_size(key).x
+    brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
+
+
+def switch(label: str, command: str, on: bool, context: commands.Context) -> None:
+    """A box to tick that runs the named command, with the key at the right end of the line."""
+    right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - em() * 0.55
+    clicked, _ = imgui.checkbox(f"{label}##{command}", on)
+    if clicked:
+        commands.run(command, context)
+    tooltip(commands.COMMANDS[command].tooltip)
+    imgui.same_line()
+    key = commands.COMMANDS[command].keys[0]
+    imgui.set_cursor_pos_x(right - imgui.calc_text_size(key).x)
+    text(key, theme.TEXT_FAINT)
+
+
+def slider(label: str, value: float, limits: tuple[float, float], shown: str, hint: str, flags: int = 0) -> float:
+    """A slider between its label and its value, which stay clear of the grab. Returns the value."""
+    imgui.align_text_to_frame_padding()
+    text(label, theme.TEXT_SOFT)
+    imgui.same_line(4.5 * em())
+    value_width = 3.4 * em()
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - value_width)
+    _, value = imgui.slider_float(f"##{label}", value, *limits, "", flags | imgui.SliderFlags_.always_clamp.value)
+    tooltip(hint)
+    imgui.same_line()
+    right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
+    imgui.set_cursor_pos_x(right - imgui.calc_text_size(shown).x)
+    text(shown)
+    return value
+
+
+def packed(colour: ImVec4) -> int:
+    """The colour as imgui's draw lists take it."""
+    return imgui.get_color_u32(colour)
+
+
+def elided(words: str, width: float) -> str:
+    """The words, their middle left out where they are wider than `width`."""
+    if imgui.calc_text_size(words).x <= width:
+        return words
+    low, high = 0, len(words)
+    while low < high:  # the most characters that fit
+        kept = (low + high + 1) // 2
+        if imgui.calc_text_size(_shortened(words, kept)).x <= width:
+            low = kept
+        else:
+            high = kept - 1
+    return _shortened(words, low)
+
+
+def _shortened(words: str, kept: int) -> str:
+    head = (kept + 1) // 2
+    tail = kept - head
+    return words[:head] + "\N{HORIZONTAL ELLIPSIS}" + (words[-tail:] if tail else "")

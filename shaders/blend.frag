@@ -1,0 +1,15 @@
+#version 330 core
+// The step `blend`: the corner views averaged by nearness to the viewpoint, before any disparity is known.
+#include "warp.glsl"
+
+layout(location = 0) out vec4 image;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec4 share = nearness();
+    vec3 sum = vec3(0.0);
+    for (int k = 0; k < 4; ++k) {
+        sum += share[k] * texelFetch(corner_views, ivec3(pixel, k), 0).rgb;
+    }
+    image = vec4(sum, 1.0);
+}
