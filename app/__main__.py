@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status: int = options.run(options)
         sys.stdout.flush()
     except LfviewError as error:
-        _say(str(error))
+        _say(f"lfview: {error}")
         return 2
     except KeyboardInterrupt:
         return 130
@@ -87,13 +87,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except MemoryError:
-        _say("There is not enough memory for this; use a smaller light field or close other programs.")
+        _say("lfview: there is not enough memory for this; use a smaller light field or close other programs.")
         return 2
     except Exception as error:
         if options.debug:
             traceback.print_exc()
         _say(
-            f"This is a bug in lfview ({type(error).__name__}: {error}); run the same command with --debug and report "
+            f"lfview: this is a bug ({type(error).__name__}: {error}); run the same command with --debug and report "
             "what it prints."
         )
         return 1

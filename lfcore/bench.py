@@ -115,7 +115,8 @@ def as_text(measured: dict[str, Any]) -> str:
             lines.append(f"  at most {speed['peak_mib']:.0f} MiB of memory")
     if "viewer" in measured:
         viewer = measured["viewer"]
-        lines.append(f"viewer: {viewer['frame_ms_p50']:.1f} ms a frame, 95 of 100 within {viewer['frame_ms_p95']:.1f} ms")
+        times = f"{viewer['frame_ms_p50']:.1f} ms a frame, 95 of 100 within {viewer['frame_ms_p95']:.1f} ms"
+        lines.append(f"viewer ({viewer['where']}): {times}")
     return "\n".join(lines)
 
 

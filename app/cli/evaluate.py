@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     models = {label: make_synthesizer(name) for label, name in labelled(options.models or ["full"]).items()}
     scores, failures = _score_all(scenes, models, options.out)
     for failure in failures:
-        print(failure, file=sys.stderr)
+        print(f"lfview: {failure}", file=sys.stderr)
     if not scores:
         return 2
     here = machine()

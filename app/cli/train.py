@@ -3,9 +3,25 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+import contextlib
+import math
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb
+from app.cli.common import Verbs, add_verb, count, open_with_progress, positive, scenes_in
+from app.progress import bar, clock
+from lfcore.errors import InputError
+
+if TYPE_CHECKING:
+    from lfcore.lightfield import LightField
+    from lfcore.training.loop import Progress, TrainConfig
+
+_LINE_SECONDS = 60.0  # between two lines where the output is no terminal
 
 
 def add_parser(verbs: Verbs[Any], name: str) -> None:
@@ -13,12 +29,154 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser = add_verb(
         verbs,
         name,
-        "train the networks; goes on where it was stopped",
+        "train the networks; the same command goes on where it was stopped",
         "lfview train --data training/* --val held_out/* --out weights.safetensors --minutes 60",
     )
+    parser.add_argument("--model", choices=["full"], default="full", help="what to train (default: full, the paper's networks)")
+    parser.add_argument(
+        "--data",
+        metavar="DIR",
+        type=Path,
+        nargs="+",
+        required=True,
+        help="light fields of at least 3 x 3 views, or folders of them",
+    )
+    parser.add_argument(
+        "--val",
+        metavar="DIR",
+        type=Path,
+        nargs="+",
+        default=[],
+        help="held-out light fields; the weights that score best on them are kept",
+    )
+    parser.add_argument("--out", metavar="FILE", required=True, help="the weights: .safetensors")
+    parser.add_argument("--minutes", type=positive, metavar="M", default=math.inf, help="stop after so long (default: never)")
+    parser.add_argument("--steps", type=count, metavar="N", default=20000, help="steps of the whole schedule (default: 20000)")
+    parser.add_argument("--patch", type=count, metavar="PX", default=60, help="side of a training patch (default: 60)")
+    parser.add_argument("--batch", type=count, metavar="N", default=20, help="patches a step, a multiple of 4 (default: 20)")
+    parser.add_argument("--lr", type=positive, metavar="R", default=1e-4, help="learning rate (default: 1e-4)")
+    parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
+    parser.add_argument(
+        "--run-dir",
+        metavar="DIR",
+        type=Path,
+        help="checkpoint and curve; a checkpoint found there is resumed (default: --out without its extension)",
+    )
+    parser.add_argument("--device", choices=["auto", "cpu", "cuda"], default="auto", help="where to compute (default: auto)")
+    parser.add_argument("--threads", type=count, metavar="N", help="processor threads (default: torch's choice)")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Train."""
+    """Train; Ctrl-C or SIGTERM ends the step, saves a checkpoint and leaves."""
+    from lfcore.export import check_folder_target, check_target
+
+    out = check_target(options.out, (".safetensors",))
+    run_dir = check_folder_target(options.run_dir or out.with_suffix(""))
+    data, held_out = scenes_in(options.data), scenes_in(options.val)
+
+    import torch
+
+    from lfcore.export import make_folder
+    from lfcore.training.loop import Runtime, train
+
+    config = _config(options)
+    if options.device == "cuda" and not torch.cuda.is_available():
+        raise InputError("There is no CUDA device that torch can use here; train with --device cpu or auto.")
+    if options.threads:
+        torch.set_num_threads(options.threads)
+    scenes, validation = _open_all(data), _open_all(held_out)
+    reporter = _Reporter()
+    with _stop_on_signal() as stop:
+        train(
+            config,
+            Runtime(device=options.device, stop_after_minutes=options.minutes),
+            scenes,
+            validation,
+            out,
+            make_folder(run_dir),
+            reporter,
+            stop,
+        )
+    reporter.finish()
+    if stop.number is not None:
+        print(f"Stopped; the same command goes on from {run_dir}.", file=sys.stderr)
+        return 128 + stop.number
+    print(f"{out}: weights; curve and checkpoint in {run_dir}")
     return 0
+
+
+def _config(options: argparse.Namespace) -> TrainConfig:
+    from lfcore.training.loop import TrainConfig
+    from lfcore.training.patches import PatchConfig
+
+    try:
+        patches = PatchConfig(size=options.patch, batch=options.batch)
+    except ValueError as error:
+        raise InputError(f"--patch {options.patch} --batch {options.batch} will not do: {error}.") from error
+    return TrainConfig(
+        steps=options.steps, learning_rate=options.lr, seed=options.seed, patches=patches, model=options.model
+    )
+
+
+def _open_all(paths: list[Path]) -> list[LightField]:
+    return [open_with_progress(path) for path in paths]
+
+
+class _Stop:
+    """Whether a signal has asked for the end; asked again, it ends the program at once."""
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+
+    def __call__(self) -> bool:
+        return self.number is not None
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Take note of the first signal; turn the second into the usual exception."""
+        if self.number is not None:
+            raise KeyboardInterrupt
+        self.number = number
+
+
+@contextlib.contextmanager
+def _stop_on_signal() -> Iterator[_Stop]:
+    stop = _Stop()
+    before = {number: signal.signal(number, stop.handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class _Reporter:
+    """Shows how training goes: a bar on a terminal; elsewhere a line a minute; validations always."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._last_line = -math.inf
+
+    def __call__(self, progress: Progress) -> None:
+        """Take one report of the training loop."""
+        now = time.monotonic()
+        validation = progress.validation
+        if validation is not None:
+            self.finish()
+            scores = ", ".join(f"{name} {psnr:.2f} dB" for name, psnr in validation.scores.items())
+            print(f"step {progress.step}: loss {progress.loss:.6f}" + (f", {scores}" if scores else ""), flush=True)
+        if self._terminal:
+            rate = max(progress.steps_per_second, 1e-9)
+            line = bar("training", progress.step, progress.steps, "steps", progress.step / rate)
+            sys.stderr.write(f"\r\x1b[K{line}, loss {progress.loss:.5f}")
+            sys.stderr.flush()
+        elif validation is None and now - self._last_line > _LINE_SECONDS:
+            self._last_line = now
+            left = (progress.steps - progress.step) / max(progress.steps_per_second, 1e-9)
+            print(f"step {progress.step} of {progress.steps}: loss {progress.loss:.6f}, {clock(left)} left", flush=True)
+
+    def finish(self) -> None:
+        """Wipe the bar."""
+        if self._terminal:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.cli.common import Verbs, add_model, add_verb
+from app.cli.common import Verbs, add_model, add_verb, count
 
 
 def add_parser(verbs: Verbs[Any], name: str) -> None:
@@ -16,11 +16,29 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "path", metavar="PATH", type=Path, nargs="?", help="an ESLF picture or a folder of views (default: the sample)"
     )
     add_model(parser)
+    parser.add_argument("--cache", type=count, default=512, metavar="MIB", help="memory for past syntheses (default: 512)")
+    parser.add_argument(
+        "--screenshot", metavar="FILE", help="open no window; write what it would show as .png, also without a display"
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Open the window and stay until it is closed."""
+    """Open the window and stay until it is closed, or write a picture of it."""
+    if options.screenshot:
+        return _write_screenshot(options)
+
     from app.viewer import run_viewer
 
-    return run_viewer(options.path, options.model)
+    return run_viewer(options.path, options.model, options.cache)
+
+
+def _write_screenshot(options: argparse.Namespace) -> int:
+    from app.offscreen import screenshot
+    from assets import sample_path
+    from lfcore.export import check_target
+
+    out = check_target(options.screenshot, (".png",))
+    screenshot(options.path or sample_path(), out, options.model)
+    print(f"{out}: the viewer on {options.path or 'the sample light field'}")
+    return 0
