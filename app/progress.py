@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from types import TracebackType
@@ -50,7 +51,9 @@ class Progress:
         if not self._shown or now - self._drawn < _INTERVAL:
             return
         self._drawn = now
-        self._stream.write(_ERASE + bar(self._label, self._done, self._total, self._unit, now - self._start))
+        line = bar(self._label, self._done, self._total, self._unit, now - self._start)
+        # A line that wraps could not be erased.
+        self._stream.write(_ERASE + line[: shutil.get_terminal_size().columns - 1])
         self._stream.flush()
 
 

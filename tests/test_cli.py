@@ -305,9 +305,9 @@ def test_train_hands_its_options_to_the_loop(
 
     monkeypatch.setattr(loop, "train", train)
     out = tmp_path / "w.safetensors"
-    options = ["--steps", "5", "--patch", "40", "--batch", "8", "--lr", "0.002", "--seed", "3", "--minutes", "1.5", "--device", "cpu"]
+    options = ["--steps", "5", "--patch", "40", "--batch", "8", "--lr", "0.002", "--seed", "3", "--minutes", "1.5"]
     before = signal.getsignal(signal.SIGINT)
-    assert main(["train", "--data", str(scene), "--out", str(out), *options]) == 130
+    assert main(["train", "--data", str(scene), "--out", str(out), "--device", "cpu", *options]) == 130
     assert signal.getsignal(signal.SIGINT) is before
     config, runtime = seen["config"], seen["runtime"]
     assert isinstance(config, loop.TrainConfig)

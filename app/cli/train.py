@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
+import shutil
 import signal
 import sys
 import time
@@ -168,7 +169,8 @@ class _Reporter:
         if self._terminal:
             rate = max(progress.steps_per_second, 1e-9)
             line = bar("training", progress.step, progress.steps, "steps", progress.step / rate)
-            sys.stderr.write(f"\r\x1b[K{line}, loss {progress.loss:.5f}")
+            line += f", loss {progress.loss:.5f}"
+            sys.stderr.write("\r\x1b[K" + line[: shutil.get_terminal_size().columns - 1])
             sys.stderr.flush()
         elif validation is None and now - self._last_line > _LINE_SECONDS:
             self._last_line = now
