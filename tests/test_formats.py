@@ -75,8 +75,10 @@ def refusal(path: Path, **options: int) -> str:
         lambda row, column: f"Scene 12 r{row}c{column} of 2016.png",
         lambda row, column: f"{row:03}-{column:03}.tif",
         lambda row, column: f"view_{row * 3 + 2}_{column * 2 + 7}.webp",
+        lambda row, column: f"shot{row * 11 + column:03}_{row}_{column}.png",
+        lambda row, column: f"lf_{row}_{column}_{row * 11 + column + 0.5}.png",
     ],
-    ids=["view_RR_CC", "lf_R_C", "two numbers among constant ones", "bare numbers", "steps"],
+    ids=["view_RR_CC", "lf_R_C", "constant numbers too", "bare numbers", "steps", "running number first", "position behind"],
 )
 def test_names_give_row_and_column(tmp_path: Path, name: Callable[[int, int], str]) -> None:
     views = random_views(3, 11)

@@ -71,7 +71,7 @@ def belongs_to_grid(file: Path, pictures: Sequence[Path]) -> bool:
     files = _families(pictures).get(template, [])
     if template in ("gantry", "hci"):
         return len(files) > 1
-    return len(files) >= 3 and len(_varying([_numbers(name) for name in files])) == 2
+    return len(files) >= 3 and len(_row_and_column([_numbers(name) for name in files])) == 2
 
 
 def _template(file: Path) -> str:
@@ -114,7 +114,7 @@ def _varying(numbers: Sequence[Sequence[int]]) -> list[int]:
 
 def _two_numbers(folder: Path, files: Sequence[Path]) -> Grid:
     numbers = [_numbers(file) for file in files]
-    varying = _varying(numbers)
+    varying = _row_and_column(numbers)
     if len(varying) != 2:
         names = f"{files[0].name} .. {files[-1].name}"
         if len(varying) == 1 and len(numbers[0]) >= 2:
@@ -126,9 +126,23 @@ def _two_numbers(folder: Path, files: Sequence[Path]) -> Grid:
             f"{folder} holds {len(files)} pictures ({names}) whose names do not give a row and a column; "
             f"expected {RULES}."
         )
-    row, column = varying
-    indexed = [((values[row], values[column]), file) for values, file in zip(numbers, files, strict=True)]
+    indexed = [((values[varying[0]], values[varying[1]]), file) for values, file in zip(numbers, files, strict=True)]
     return _arrange(folder, "folder of views", indexed)
+
+
+def _row_and_column(numbers: Sequence[Sequence[int]]) -> list[int]:
+    """Positions of the row and the column among the numbers of the names, or of whatever varies where they are not two.
+
+    Where more than two vary (a running number before them, a position behind them), the first or the last two are taken if
+    they number every place of a full grid once.
+    """
+    varying = _varying(numbers)
+    for pair in (varying[:2], varying[-2:]):
+        rows, columns = ({values[position] for values in numbers} for position in pair) if len(pair) == 2 else ((), ())
+        places = {tuple(values[position] for position in pair) for values in numbers}
+        if len(places) == len(numbers) == len(rows) * len(columns):
+            return pair
+    return varying
 
 
 def _arrange(folder: Path, kind: str, indexed: Iterable[tuple[Index, Path]]) -> Grid:
