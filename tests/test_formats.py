@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import struct
+import sys
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -381,6 +382,38 @@ def test_a_truncated_view_is_named(tmp_path: Path, extension: str) -> None:
     broken = folder / f"v_1_0{extension}"
     broken.write_bytes(broken.read_bytes()[: broken.stat().st_size // 2])
     assert broken.name in refusal(folder)
+
+
+@pytest.mark.parametrize("extension", [".png", ".webp", ".jpg", ".tif", ".exr"])
+def test_damaged_bytes_give_a_picture_or_a_sentence(tmp_path: Path, extension: str) -> None:
+    dtype = np.float32 if extension == ".exr" else np.uint8
+    folder = save_views(tmp_path, random_views(2, 2, 40, 50, dtype), lambda row, column: f"v_{row}_{column}{extension}")
+    broken = folder / f"v_1_0{extension}"
+    intact = broken.read_bytes()
+    generator = np.random.default_rng(4)
+    refused = 0
+    for _ in range(40):
+        damaged = bytearray(intact)
+        # Most of what can go wrong stands in the header.
+        for place in generator.integers(0, min(len(intact), 250), 4):
+            damaged[place] = generator.integers(0, 256)
+        broken.write_bytes(damaged)
+        try:
+            open_light_field(folder)
+        except InputError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused > 5
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux allows names that are no text")
+def test_names_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe"))
+    for row, column in itertools.product(range(2), range(2)):
+        source = save(tmp_path / plain(row, column), random_views(2, 2)[row, column])
+        folder.mkdir(exist_ok=True)
+        source.rename(folder / source.name)
+    assert "not valid UTF-8" in refusal(folder)
 
 
 def test_a_truncated_eslf_is_refused(tmp_path: Path) -> None:

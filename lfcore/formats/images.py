@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,7 +106,7 @@ class Picture:
 
     def _checked(self, pixels: Pixels | None, rows: int) -> Pixels:
         # A JPEG that ends early is filled up with grey and returned: only the error text tells.
-        reason = self._source.geterror()
+        reason = _reason(self._source.geterror)
         if pixels is None or reason:
             raise InputError(f"{self.path} is damaged or cut off ({_first_line(reason)}); copy or export it again.")
         return pixels.reshape(rows, self.header.width, self.header.channels)
@@ -118,9 +118,14 @@ def open_picture(path: Path) -> Iterator[Picture]:
     # Colours of transparent pixels are wanted as stored, not multiplied by alpha.
     wish = oiio.ImageSpec()
     wish.attribute("oiio:UnassociatedAlpha", 1)
+    try:
+        # OpenImageIO takes names in UTF-8 only; Linux allows any bytes.
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        raise InputError(f"The name {str(path)!a} is not valid UTF-8; rename the file or its folder.") from error
     source = oiio.ImageInput.open(str(path), wish)
     if source is None:
-        raise _cannot_open(path, oiio.geterror())
+        raise _cannot_open(path, _reason(oiio.geterror))
     try:
         yield Picture(path, source)
     finally:
@@ -148,7 +153,10 @@ def _header(path: Path, spec: Any) -> Header:
         raise InputError(f"{path} stores its values as {spec.format}; expected 8 bit, 16 bit or float: convert it.")
     if spec.depth > 1 or min(spec.width, spec.height, spec.nchannels) < 1:
         raise InputError(f"{path} holds no flat picture ({spec.width} x {spec.height} x {spec.depth}).")
-    names = [str(name).upper() for name in spec.channelnames]
+    try:
+        names = [str(name).upper() for name in spec.channelnames]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is damaged: the names of its channels are no text; copy or export it again.") from error
     first = names.index("R") if names[:3] != ["R", "G", "B"] and _has_rgb(names) else 0
     channels = 3 if spec.nchannels >= 3 else 1
     return Header(spec.width, spec.height, first, channels, dtype, bool(spec.tile_width))
@@ -156,6 +164,14 @@ def _header(path: Path, spec: Any) -> Header:
 
 def _has_rgb(names: list[str]) -> bool:
     return "R" in names and names[names.index("R") :][:3] == ["R", "G", "B"]
+
+
+def _reason(geterror: Callable[[], str]) -> str:
+    """OpenImageIO's own words; those of damaged files may quote bytes that are no text."""
+    try:
+        return geterror()
+    except UnicodeDecodeError:
+        return "its header is damaged"
 
 
 def _first_line(reason: str) -> str:
