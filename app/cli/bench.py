@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +37,9 @@ def run(options: argparse.Namespace) -> int:
 
     from assets import sample_path
     from lfcore import bench
-    from lfcore.machine import machine
+    from lfcore.machine import core_count, machine
 
+    _say_if_busy(core_count())
     path = options.path or sample_path()
     models = labelled(options.models or ["full"])
     with Progress("measuring", len(models) + 1, "parts") as bar:
@@ -54,6 +57,15 @@ def run(options: argparse.Namespace) -> int:
     if options.json != "-":
         print(bench.as_text(measured))
     return 0
+
+
+def _say_if_busy(cores: int) -> None:
+    """Warn where other programs keep the processor busy, since they take their share from every figure."""
+    if not hasattr(os, "getloadavg"):
+        return
+    load = os.getloadavg()[0]
+    if load > cores / 2:
+        print(f"Note: this machine is busy (load {load:.1f} on {cores} cores), so the figures will be low.", file=sys.stderr)
 
 
 def _frame_times(path: Path, model: str) -> dict[str, Any]:
