@@ -24,7 +24,9 @@ FADE_SECONDS = 0.12
 # A dragged viewpoint that comes to rest this near to a captured or a cached one goes there: no pixel of an ordinary light
 # field moves visibly by it, and the camera's view or the finished picture is there at once.
 MAGNET_RADIUS = 0.012
-STOP_SECONDS = 2.0
+STOP_SECONDS = 10.0
+# The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
+SYNTHESIS_NICENESS = 5
 
 
 class Controller:
@@ -41,7 +43,7 @@ class Controller:
         self._model = model
         self._wake = wake
         self._loader: LatestWorker[LightField] = LatestWorker("loader", wake)
-        self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake)
+        self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
         self._loading: Path | None = None
         self._load_ticket = 0
         self._loaded_share = 0.0

@@ -25,7 +25,7 @@ _REPEATING = frozenset(("Left", "Right", "Up", "Down"))
 
 
 def run_pressed(context: commands.Context) -> None:
-    """Run every command whose key goes down (or repeats) in this frame. While a text is typed, only those with Ctrl, Esc, F1."""
+    """Run every command whose key goes down (or repeats) in this frame; while a text is typed, only with Ctrl, Esc, F1."""
     io = imgui.get_io()
     typing = io.want_text_input or context.state.path_field
     typed = "" if typing else "".join(map(chr, io.input_queue_characters))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 # imgui-bundle brings its own glfw library and tells the glfw package to use that one: it must be imported first, or two
@@ -45,43 +46,42 @@ def run_viewer(path: Path | None, model: str = "full", cache_mib: int = 512) -> 
 
     Faults of light fields and models are shown in the window. Raises NoDisplay where there is no display or no OpenGL 3.3.
     """
-    window = _Window()
-    try:
-        controller = _controller(model, cache_mib)
-        try:
-            window.attach(controller)
-            window.draw()  # the first frame, before anything slow is imported
-            controller.start()
-            controller.open(path if path is not None else sample_path())
-            window.run()
-        finally:
-            controller.stop()
-    finally:
-        window.close()
+    engine = Engine(synthesizer_factory(model), cache_mib * MEBIBYTE)
+    show(path if path is not None else sample_path(), engine, Path(model).name)
     return 0
+
+
+def show(path: Path, engine: Engine, model: str) -> None:
+    """Open the window on the light field at `path` with this engine, and stay until it is closed."""
+    with _window(engine, model) as (window, controller):
+        window.draw()  # the first frame, before anything slow is imported
+        controller.start()
+        controller.open(path)
+        window.run()
 
 
 def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTimes:
     """Frame times on the light field at `path` as `app.frametimes.measure` defines them: in a window, else off screen."""
     try:
-        window = _Window()
-    except NoDisplay:
-        return measure_frames_offscreen(path, seconds, model)
-    try:
-        controller = _controller(model, 512)
-        try:
-            window.attach(controller)
+        with _window(Engine(synthesizer_factory(model), 512 * MEBIBYTE), model) as (window, controller):
             controller.open(path)
             return frametimes.measure(controller, window.poll_and_draw, seconds, "window")
-        finally:
-            controller.stop()
+    except NoDisplay:
+        return measure_frames_offscreen(path, seconds, model)
+
+
+@contextmanager
+def _window(engine: Engine, model: str) -> Iterator[tuple[_Window, Controller]]:
+    """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
+    window = _Window()
+    controller = Controller(engine, open_by_content, wake=glfw.post_empty_event, model=model)
+    try:
+        window.attach(controller)
+        yield window, controller
     finally:
+        window.hide()
+        controller.stop()
         window.close()
-
-
-def _controller(model: str, cache_mib: int) -> Controller:
-    engine = Engine(synthesizer_factory(model), cache_mib * MEBIBYTE)
-    return Controller(engine, open_by_content, wake=glfw.post_empty_event, model=Path(model).name)
 
 
 class _Loader:
@@ -173,6 +173,10 @@ class _Window:
         interface.draw(Target(self._target, size), time.monotonic())
         glfw.swap_buffers(self._window)
         self._name_window(interface.controller)
+
+    def hide(self) -> None:
+        """Take the window off the screen."""
+        glfw.hide_window(self._window)
 
     def close(self) -> None:
         """Give the window and everything in it back."""

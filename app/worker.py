@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
 import queue
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,12 +41,14 @@ class LatestWorker(Generic[Result]):
 
     A job is a function of `cancelled`, which it should ask now and then, and after which it may raise errors.Cancelled:
     such a job leaves no result. Any other exception becomes a Failed, so the thread outlives every job. `wake` is called
-    from the thread after each outcome; the outcomes are in `outcomes`.
+    from the thread after each outcome; the outcomes are in `outcomes`. `niceness` lowers the thread's priority, and that
+    of threads it starts, where the system knows priorities of threads.
     """
 
-    def __init__(self, name: str, wake: Callable[[], None]) -> None:
+    def __init__(self, name: str, wake: Callable[[], None], niceness: int = 0) -> None:
         self.outcomes: queue.SimpleQueue[Done[Result] | Failed] = queue.SimpleQueue()
         self._wake = wake
+        self._niceness = niceness
         self._changed = threading.Condition()
         self._waiting: tuple[int, Job[Result]] | None = None
         self._running: int | None = None
@@ -97,6 +101,8 @@ class LatestWorker(Generic[Result]):
         return not self._thread.is_alive()
 
     def _run(self) -> None:
+        if self._niceness and sys.platform == "linux":
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._niceness)
         while True:
             with self._changed:
                 while self._waiting is None and not self._stopping:

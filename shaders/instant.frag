@@ -21,20 +21,21 @@ void main() {
         mean += share[k] * seen[k];
         total += share[k];
     }
-    mean /= max(total, 1e-6);
+    mean /= total;
+    share /= total;
     // Views that disagree beyond noise see different things there; the side with more weight is believed.
     float tolerance = 0.02 + 0.12 * dot(mean, vec3(1.0 / 3.0));
     vec3 sum = vec3(0.0);
     total = 0.0;
     for (int i = 0; i < 4; ++i) {
-        float agreement = 1e-4;
+        float agreement = 0.01;
         for (int j = 0; j < 4; ++j) {
             vec3 difference = seen[i] - seen[j];
             agreement += share[j] * exp(-0.5 * dot(difference, difference) / (tolerance * tolerance));
         }
-        float weight = share[i] * agreement;
+        float weight = share[i] * agreement * agreement * agreement;
         sum += weight * seen[i];
         total += weight;
     }
-    image = vec4(clamp(sum / max(total, 1e-9), 0.0, 1.0), 1.0);
+    image = vec4(clamp(sum / total, 0.0, 1.0), 1.0);
 }

@@ -1,0 +1,39 @@
+"""Fixtures that several test files share: one GL context per run, an imgui context without GL, a made-up light field."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+# A software context, so that the tests see the same pictures on every machine.
+os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
+
+
+@pytest.fixture(scope="session")
+def gl() -> Any:
+    """The standalone GL context of this run, through EGL; tests that need it are skipped where there is none."""
+    from app.canvas import standalone_context
+    from lfcore.errors import LfviewError
+
+    try:
+        return standalone_context()
+    except LfviewError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def imgui_context() -> Iterator[Any]:
+    """A fresh imgui context that takes events but draws nothing."""
+    from imgui_bundle import ImVec2, imgui
+
+    context = imgui.create_context()
+    io = imgui.get_io()
+    io.set_ini_filename("")
+    io.display_size = ImVec2(1280, 800)
+    io.delta_time = 1 / 60
+    io.backend_flags |= imgui.BackendFlags_.renderer_has_textures.value
+    yield imgui
+    imgui.destroy_context(context)

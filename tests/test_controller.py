@@ -1,0 +1,307 @@
+"""The program behind the window: opening, synthesizing, the cache, faults, the magnets."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from app.controller import FADE_SECONDS, MAGNET_RADIUS, REST_SECONDS, Controller
+from app.engine import Engine, disparity_range
+from app.state import Look, Step
+from app.worker import Cancel
+from lfcore.errors import InputError, WeightsError
+from lfcore.lightfield import LightField
+from lfcore.metrics import k16
+from tests.moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
+
+PATIENCE = 10.0
+Progress = Callable[[float], None]
+
+
+class Program:
+    """A controller with its own clock, fed by made-up light fields: "3x3", "2x2", and so on; anything else fails to open."""
+
+    def __init__(self, synthesizer: TruthSynthesizer) -> None:
+        self.synthesizer = synthesizer
+        self.engine = Engine(lambda: synthesizer, 64 * 2**20)
+        self.controller = Controller(self.engine, self.opened, lambda: None, "truth")
+        self.now = 100.0
+
+    def opened(self, path: Path, progress: Progress, cancelled: Cancel) -> LightField:
+        progress(0.5)
+        if "x" not in path.name:
+            raise InputError(f"{path.name} holds no views.")
+        rows, columns = map(int, path.name.split("x"))
+        return light_field(rows, columns)
+
+    def tick(self, seconds: float = 0.01) -> None:
+        self.now += seconds
+        self.controller.tick(self.now)
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + PATIENCE
+        self.tick()
+        while not condition():
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+            self.tick()
+
+    def open(self, name: str) -> None:
+        self.controller.open(Path(name))
+        self.until(lambda: self.controller.readout(None).loading is None)
+
+    def until_full(self) -> None:
+        self.until(lambda: self.controller.step is Step.FULL)
+
+
+@pytest.fixture
+def program() -> Iterator[Program]:
+    made = Program(TruthSynthesizer())
+    yield made
+    made.controller.stop()
+
+
+def test_steps_go_from_blend_to_full_and_instant_carries_the_drag(program: Program) -> None:
+    program.synthesizer.seconds = 0.05
+    program.open("3x3")
+    controller = program.controller
+    assert controller.step is Step.BLEND
+    program.until_full()
+    controller.state.move_to(0.3, 0.4)
+    program.tick()
+    assert controller.step is Step.INSTANT
+    program.until_full()
+    assert controller.picture is not None
+    assert (controller.picture.synthesis.u, controller.picture.synthesis.v) == (0.3, 0.4)
+
+
+def test_full_fades_in_when_new_and_is_there_at_once_from_the_cache(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    controller = program.controller
+    assert 0 <= controller.full_share < 1
+    assert controller.next_frame_in == 0.0
+    program.tick(FADE_SECONDS)
+    assert controller.full_share == 1
+    controller.state.move_to(0.3, 0.4)
+    program.until_full()
+    controller.state.move_to(0.5, 0.5)
+    program.tick()
+    assert controller.step is Step.FULL
+    assert controller.full_share == 1
+    readout = controller.readout(None)
+    assert readout.from_cache
+    assert readout.cache_hits == 1
+    assert set(readout.cached) == {(0.5, 0.5), (0.3, 0.4)}
+
+
+def test_an_answer_for_a_viewpoint_that_was_left_is_not_shown_as_full(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.synthesizer.seconds = 0.2
+    controller = program.controller
+    controller.state.move_to(0.3, 0.3)
+    program.until(lambda: (0.3, 0.3) in program.synthesizer.asked)
+    controller.state.move_to(0.4, 0.3)
+    program.tick()  # the hand is moving: the query for 0.3 goes on, and its disparity map is taken
+    deadline = time.monotonic() + PATIENCE
+    while controller.newest is None or controller.newest.synthesis.u == 0.5:
+        assert time.monotonic() < deadline
+        program.tick(0.0)
+        time.sleep(0.002)
+    assert controller.newest.synthesis.u == 0.3
+    assert controller.step is Step.INSTANT
+
+
+def test_a_query_for_another_viewpoint_is_given_up_when_the_hand_rests(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.synthesizer.seconds = 60.0
+    controller = program.controller
+    controller.state.move_to(0.3, 0.3)
+    program.until(lambda: (0.3, 0.3) in program.synthesizer.asked)
+    program.synthesizer.seconds = 0.0
+    controller.state.move_to(0.4, 0.3)
+    program.until_full()  # long before the 60 s are over
+    assert controller.picture is not None
+    assert controller.picture.synthesis.u == 0.4
+
+
+def test_score_is_that_of_the_picture_on_screen_against_the_captured_view(program: Program) -> None:
+    program.open("3x3")
+    program.until(lambda: program.controller.readout(None).score is not None)  # the centre of 3 x 3 is a captured view
+    score = program.controller.readout(None).score
+    assert score is not None
+    expected = k16(truth(0.5, 0.5), light_field(3, 3).view(1, 1))
+    assert (score.psnr, score.ssim) == pytest.approx((expected.psnr, expected.ssim))
+    assert "K16" in score.protocol
+    program.controller.state.move_to(0.3, 0.5)
+    program.until_full()
+    assert program.controller.readout(None).score is None
+
+
+def test_captured_step_only_where_there_is_a_captured_view(program: Program) -> None:
+    program.open("3x3")
+    controller = program.controller
+    controller.state.captured = True
+    program.tick()
+    assert controller.step is Step.CAPTURED
+    controller.state.look = Look.ERROR
+    assert controller.step is not Step.CAPTURED
+    controller.state.look = Look.SYNTHESIS
+    controller.state.move_to(0.3, 0.3)
+    program.tick()
+    assert controller.step is not Step.CAPTURED
+
+
+def test_a_light_field_that_does_not_open_leaves_the_old_one_and_says_why(program: Program) -> None:
+    program.open("3x3")
+    old = program.controller.light_field
+    program.open("nothing")
+    assert program.controller.light_field is old
+    assert program.controller.messages == ["nothing holds no views."]
+    program.open("nothing")
+    assert len(program.controller.messages) == 1  # not said twice
+    program.controller.dismiss()
+    assert program.controller.messages == []
+    program.until_full()  # and the viewer lives on
+
+
+def test_opening_another_takes_the_place_of_one_being_opened(program: Program) -> None:
+    seen: list[str] = []
+
+    def slow(path: Path, progress: Progress, cancelled: Cancel) -> LightField:
+        seen.append(path.name)
+        deadline = time.monotonic() + PATIENCE
+        while path.name == "slow" and not cancelled():
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+        return light_field(2, 2)
+
+    controller = Controller(program.engine, slow, lambda: None, "truth")
+    program.controller, old = controller, program.controller
+    old.stop()
+    controller.open(Path("slow"))
+    program.until(lambda: seen == ["slow"])
+    program.open("other")
+    assert controller.light_field is not None
+    assert controller.light_field.rows == 2
+    assert seen == ["slow", "other"]
+
+
+def test_opening_can_be_cancelled(program: Program) -> None:
+    program.controller.open(Path("3x3"))
+    program.controller.cancel_open()
+    for _ in range(50):
+        program.tick()
+        time.sleep(0.002)
+    assert program.controller.light_field is None
+    assert program.controller.readout(None).loading is None
+
+
+def test_closing_shows_nothing_and_another_can_be_opened(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.controller.state.move_to(0.1, 0.2)
+    program.controller.close()
+    program.tick()
+    assert program.controller.readout(None).grid is None
+    program.open("2x2")
+    assert program.controller.viewpoint == (0.5, 0.5)
+    program.until_full()
+
+
+def test_a_model_that_cannot_be_loaded_is_said_once_and_blend_remains() -> None:
+    def broken() -> TruthSynthesizer:
+        raise WeightsError("The weight file is damaged; get it again.")
+
+    program = Program(TruthSynthesizer())
+    program.controller.stop()
+    program.controller = Controller(Engine(broken, 2**20), program.opened, lambda: None, "full")
+    try:
+        program.open("3x3")
+        program.until(lambda: bool(program.controller.messages))
+        program.controller.state.move_to(0.3, 0.3)
+        for _ in range(30):
+            program.tick()
+            time.sleep(0.002)
+        assert program.controller.messages == ["The weight file is damaged; get it again."]
+        assert program.controller.step is Step.BLEND
+    finally:
+        program.controller.stop()
+
+
+def test_a_fault_in_a_synthesis_is_said_and_the_next_one_comes(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    honest = program.synthesizer.synthesize
+
+    def faulty(u: float, v: float, cancelled: Callable[[], bool]) -> None:
+        raise RuntimeError("out of luck")
+
+    program.synthesizer.synthesize = faulty  # type: ignore[method-assign, assignment]
+    program.controller.state.move_to(0.3, 0.3)
+    program.until(lambda: bool(program.controller.messages))
+    assert "out of luck" in program.controller.messages[0]
+    assert program.controller.step is Step.INSTANT
+    program.synthesizer.synthesize = honest  # type: ignore[method-assign]
+    program.controller.state.move_to(0.35, 0.3)
+    program.until_full()
+
+
+def test_a_dragged_viewpoint_rests_on_a_captured_or_cached_one_nearby(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    controller, state = program.controller, program.controller.state
+    state.move_to(0.3, 0.3)
+    program.until_full()
+    for magnet in ((0.3, 0.3), (0.0, 0.5)):  # cached, captured
+        state.move_to(magnet[0] + 0.1, magnet[1])
+        program.tick()
+        state.drag_by(-0.1 + 0.6 * MAGNET_RADIUS, 0)
+        state.dragging = False
+        program.tick()
+        assert controller.viewpoint != magnet  # not while it moves
+        program.tick(REST_SECONDS)
+        assert controller.viewpoint == magnet
+    state.move_to(0.7, 0.7)
+    state.drag_by(0.01, 0)
+    program.tick()
+    program.tick(REST_SECONDS)
+    assert controller.viewpoint == (0.71, 0.7)
+
+
+def test_keys_may_go_where_a_magnet_would_pull(program: Program) -> None:
+    program.open("3x3")
+    program.controller.state.move_to(0.505, 0.5)
+    program.tick()
+    program.tick(REST_SECONDS)
+    assert program.controller.viewpoint == (0.505, 0.5)
+
+
+def test_an_idle_program_asks_for_no_frames(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.tick(1.0)
+    assert program.controller.next_frame_in is None
+
+
+def test_disparity_under_the_cursor(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.controller.state.cursor = (10.5, 20.5)
+    assert program.controller.readout(None).disparity_under_cursor == DISPARITY
+    program.controller.state.cursor = (1e4, 0)
+    assert program.controller.readout(None).disparity_under_cursor is None
+
+
+def test_disparity_range_leaves_out_the_tails() -> None:
+    percentiles = tuple(float(i) for i in range(101))
+    assert disparity_range(percentiles, 0) == (0, 100)
+    assert disparity_range(percentiles, 5) == (5, 95)
+    low, high = disparity_range((2.0,) * 101, 0)
+    assert high - low == pytest.approx(0.1)
+    assert (low + high) / 2 == pytest.approx(2)
