@@ -86,10 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read the output has gone; give the interpreter something to flush into at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
-    except MemoryError:
-        _say("lfview: there is not enough memory for this; use a smaller light field or close other programs.")
-        return 2
     except Exception as error:
+        if _is_out_of_memory(error):
+            _say("lfview: there is not enough memory for this; use a smaller light field or close other programs.")
+            return 2
         if options.debug:
             traceback.print_exc()
         _say(
@@ -138,6 +138,11 @@ def _check_not_a_typo(word: str) -> None:
     if near and not Path(word).exists():
         _say(f"lfview: there is no verb or file {word!r}; did you mean {near[0]!r}?")
         raise SystemExit(2)
+
+
+def _is_out_of_memory(error: Exception) -> bool:
+    """Python's MemoryError, or torch's, which is a RuntimeError that says so."""
+    return isinstance(error, MemoryError) or "can't allocate memory" in str(error)
 
 
 def _say(sentence: str) -> None:

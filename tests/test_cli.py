@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import OpenImageIO as oiio
 import pytest
+import torch
 
 from app.__main__ import VERBS, main
 from app.cli.common import labelled, scenes_in
@@ -436,6 +437,18 @@ def test_a_bug_says_so_and_exits_with_1(
     assert "this is a bug (ZeroDivisionError: by zero)" in one_sentence(capsys.readouterr().err)
     assert main(["info", str(scene), "--debug"]) == 1
     assert "Traceback" in capsys.readouterr().err
+
+
+def test_want_of_memory_is_no_bug(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def too_large(*_: object, **__: object) -> LightField:
+        torch.empty(2**60)
+        raise AssertionError
+
+    monkeypatch.setattr("app.cli.info.open_with_progress", too_large)
+    assert main(["info", str(scene)]) == 2
+    assert "not enough memory" in one_sentence(capsys.readouterr().err)
 
 
 # Signals and pipes

@@ -168,8 +168,8 @@ class _Reporter:
             print(f"step {progress.step}: loss {progress.loss:.6f}" + (f", {scores}" if scores else ""), flush=True)
         if self._terminal:
             rate = max(progress.steps_per_second, 1e-9)
-            line = bar("training", progress.step, progress.steps, "steps", progress.step / rate)
-            line += f", loss {progress.loss:.5f}"
+            label = f"training, loss {progress.loss:.5f}"
+            line = bar(label, progress.step, progress.steps, "steps", progress.step / rate)
             sys.stderr.write("\r\x1b[K" + line[: shutil.get_terminal_size().columns - 1])
             sys.stderr.flush()
         elif validation is None and now - self._last_line > _LINE_SECONDS:
