@@ -1,0 +1,90 @@
+"""The viewer without a window: the picture file, its faults, and the paths that people type."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from app import offscreen
+from app.interface import path_from_text
+from app.layout import lay_out
+from app.state import Zoom, place
+from lfcore.errors import InputError
+from lfcore.lightfield import FloatArray
+from tests.moving_scene import SIZE, TruthSynthesizer, light_field, truth
+
+WINDOW = (900, 600)
+
+
+@pytest.fixture
+def made_up(gl: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Off screen on the run's one GL context, on a made-up light field and a model that knows the truth."""
+    monkeypatch.setattr(offscreen, "standalone_context", lambda: gl)
+    monkeypatch.setattr(offscreen, "open_by_content", lambda *_: light_field())
+    monkeypatch.setattr(offscreen, "synthesizer_factory", lambda _: TruthSynthesizer)
+
+
+def read(path: Path) -> FloatArray:
+    picture = oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT)
+    assert isinstance(picture, np.ndarray)
+    return picture
+
+
+@pytest.mark.usefixtures("made_up")
+def test_the_screenshot_shows_the_synthesis_fitted_into_its_area(tmp_path: Path) -> None:
+    out = tmp_path / "viewer.png"
+    offscreen.screenshot(Path("any"), out, size=WINDOW)
+    picture = read(out)
+    assert picture.shape == (WINDOW[1], WINDOW[0], 3)
+    placement = place(Zoom(), (SIZE[1], SIZE[0]), lay_out(*WINDOW, 1.0, panel_wanted=True).picture)
+    expected = truth(0.5, 0.5)
+    for x, y in ((20, 20), (64, 48), (100, 80)):
+        window_x, window_y = placement.to_window((x + 0.5, y + 0.5))
+        np.testing.assert_allclose(picture[int(window_y), int(window_x)], expected[y, x], atol=0.02)
+    assert list(tmp_path.iterdir()) == [out]
+
+
+@pytest.mark.usefixtures("made_up")
+def test_two_screenshots_in_one_process(tmp_path: Path) -> None:
+    offscreen.screenshot(Path("any"), tmp_path / "a.png", size=WINDOW)
+    offscreen.screenshot(Path("any"), tmp_path / "b.png", size=WINDOW, scale=2.0)
+    assert read(tmp_path / "b.png").shape == (WINDOW[1], WINDOW[0], 3)
+
+
+@pytest.mark.usefixtures("made_up")
+def test_a_light_field_that_does_not_open_ends_in_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(*_: object) -> None:
+        raise InputError("It is empty; choose another.")
+
+    monkeypatch.setattr(offscreen, "open_by_content", refuse)
+    assert offscreen.main([str(tmp_path / "no"), "--out", str(tmp_path / "viewer.png")]) == 2
+    assert capsys.readouterr().err == "lfview: It is empty; choose another.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("made_up")
+def test_frame_times_are_measured_while_the_synthesis_runs() -> None:
+    times = offscreen.measure_frames_offscreen(Path("any"), 0.5, "full")
+    assert times.frames > 3
+    assert 0 < times.p50_ms <= times.p95_ms
+    assert times.where == "off screen"
+
+
+@pytest.mark.parametrize(
+    ("text", "path"),
+    [
+        ("  /tmp/a b ", "/tmp/a b"),
+        ("'/tmp/a b'", "/tmp/a b"),
+        ('"/tmp/ä"', "/tmp/ä"),
+        ("file:///tmp/a%20b", "/tmp/a b"),
+        ("~/x", str(Path.home() / "x")),
+    ],
+)
+def test_typed_paths(text: str, path: str) -> None:
+    assert path_from_text(text) == Path(path)

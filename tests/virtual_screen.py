@@ -1,0 +1,104 @@
+"""A virtual screen for whole-program tests: its own Xvfb on a free display, events by xdotool, pixels from its memory."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+SIZE = (1280, 800)
+PATIENCE = 60.0
+_HEADER_WORDS = 25  # of an XWD file, big-endian
+
+
+def missing_tools() -> list[str]:
+    """The programs that these tests need and that are not installed."""
+    return [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
+
+
+def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
+    """Wait for the condition, at most so many seconds."""
+    deadline = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {patience:.0f} s for {what}"
+        time.sleep(0.03)
+
+
+@dataclass(frozen=True)
+class VirtualScreen:
+    """A running Xvfb."""
+
+    display: str
+    memory: Path
+
+    def environment(self) -> dict[str, str]:
+        """What programs on this screen need to find it, and no other."""
+        kept = {name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"}
+        return {**kept, "DISPLAY": self.display, "LIBGL_ALWAYS_SOFTWARE": "1"}
+
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        """What is on the screen now: (H, W, 3)."""
+        data = self.memory.read_bytes()
+        header = struct.unpack(f">{_HEADER_WORDS}I", data[: 4 * _HEADER_WORDS])
+        size, width, height, bytes_per_line, colours = header[0], header[4], header[5], header[12], header[19]
+        start = size + 12 * colours
+        rows = np.frombuffer(data, np.uint8, height * bytes_per_line, start).reshape(height, bytes_per_line // 4, 4)
+        return rows[:, :width, 2::-1]  # stored as blue, green, red, nothing
+
+    def xdotool(self, *words: str | int) -> None:
+        """Mouse and keys."""
+        subprocess.run(["xdotool", *map(str, words)], env=self.environment(), check=True, timeout=PATIENCE)
+
+    def drag(self, start: tuple[int, int], delta: tuple[int, int]) -> None:
+        """Move the mouse to `start`, press the left button and move by `delta`; the button stays down."""
+        self.xdotool("mousemove", *start)
+        self.xdotool("mousedown", 1)
+        for part in (1, 2, 3):
+            self.xdotool("mousemove", start[0] + delta[0] * part // 3, start[1] + delta[1] * part // 3)
+
+    @contextmanager
+    def program(self, code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+        """Run Python code on this screen; it is ended with the block if it has not ended by itself."""
+        command = [sys.executable, "-c", code, *arguments]
+        root = Path(__file__).parents[1]
+        running = subprocess.Popen(command, env=self.environment(), cwd=root, text=True, stderr=subprocess.PIPE)
+        try:
+            yield running
+        finally:
+            if running.poll() is None:
+                running.terminate()
+                try:
+                    running.wait(PATIENCE)
+                except subprocess.TimeoutExpired:
+                    running.kill()
+            if running.stderr is not None:
+                running.stderr.close()
+
+
+@contextmanager
+def virtual_screen(folder: Path) -> Iterator[VirtualScreen]:
+    """Start an Xvfb that keeps its picture in `folder`; end it with the block."""
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-dpi", "96"]
+    server = subprocess.Popen(
+        [*command, "-nolisten", "tcp", "-fbdir", str(folder)], pass_fds=[write], stderr=subprocess.DEVNULL
+    )
+    os.close(write)
+    try:
+        with os.fdopen(read) as answer:
+            number = answer.readline().strip()
+        assert number, "Xvfb did not start"
+        yield VirtualScreen(f":{number}", folder / "Xvfb_screen0")
+    finally:
+        server.terminate()
+        server.wait(PATIENCE)
