@@ -85,6 +85,8 @@ def initialise(model: FullModel, seed: int) -> None:
             nn.init.zeros_(module.bias)
     stack = model.colour
     with torch.no_grad():
+        # Disparities are some ten times as large as colours: without this their random weights drown the average.
+        stack.hidden[0].weight[:, 0] *= 0.1
         first = True
         for layer in stack.hidden:
             if isinstance(layer, nn.Conv2d):

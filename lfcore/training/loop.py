@@ -27,8 +27,9 @@ from lfcore.networks import BORDER, FullModel, colour_features, initialise
 from lfcore.planesweep import Window, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import NetworkSynthesizer, corner_offsets, corner_tensor, fastest_dtype
 from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lfcore.training.conditioning import condition, plain_copy
 from lfcore.training.curve import CurvePoint, write_curve
-from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, sample_group
+from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, sample_group
 from lfcore.warp import backward_warp
 from lfcore.weights import save_weights
 
@@ -42,7 +43,7 @@ class TrainConfig:
     warm_up_steps: int = 100  # learning rate grows from 0
     decay_share: float = 0.3  # of the steps, at the end, in which the learning rate falls to a hundredth
     matching_steps: int = 1000  # in which the disparity is also drawn to the plane sweep's best match (see matching_disparity)
-    matching_weight: float = 0.01
+    matching_weight: float = 0.03
     average: float = 0.999  # decay of the running average of the weights; the average is what is validated and shipped
     seed: int = 1
     patches: PatchConfig = field(default_factory=PatchConfig)
@@ -109,6 +110,7 @@ def train(
     keep_freed_memory()
     trainer = _Trainer(config, _device(runtime.device), run_dir)
     prepared = [prepare_scene(scene) for scene in scenes]
+    check_room(prepared, config.patches, FullModel().config.levels)
     began = last_validation = time.monotonic()
     first_step = trainer.step
     running = math.nan
@@ -142,6 +144,7 @@ class _Trainer:
         self._run_dir = run_dir
         self._model = FullModel()
         initialise(self._model, config.seed)
+        condition(self._model)
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
         self._optimiser = torch.optim.Adam(self._model.parameters(), lr=config.learning_rate, betas=(0.9, 0.999), fused=True)
@@ -236,7 +239,7 @@ class _Trainer:
 
     def validate(self, light_fields: Sequence[LightField], loss: float) -> CurvePoint:
         """K16 of the averaged weights on each held-out light field, by the synthesizer that users get."""
-        synthesizer = NetworkSynthesizer(copy.deepcopy(self._average).cpu().float(), "validation")
+        synthesizer = NetworkSynthesizer(plain_copy(self._average), "validation")
         scores: dict[str, float] = {}
         for light_field in light_fields:
             row, column = light_field.rows // 2, light_field.columns // 2
@@ -258,7 +261,7 @@ class _Trainer:
                 "scenes": [scene.name for scene in scenes],
                 "k16_psnr": {name: round(value, 3) for name, value in self._curve[-1].scores.items()},
             }
-            save_weights(out, self._average, training)
+            save_weights(out, plain_copy(self._average), training)
         save_checkpoint(
             self._checkpoint_path,
             Checkpoint(

@@ -14,6 +14,7 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from lfcore.errors import InputError
 from lfcore.lightfield import CORNERS, FloatArray, LightField, as_float
 from lfcore.planesweep import Levels, Window
 
@@ -65,6 +66,18 @@ def margin(levels: Levels) -> int:
     return int(np.ceil(levels.reach)) + 2
 
 
+def check_room(scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels) -> None:
+    """Raise InputError unless a patch with its margin fits into every scene."""
+    side = config.size + 2 * margin(levels)
+    for scene in scenes:
+        field = scene.light_field
+        if min(field.height, field.width) < side:
+            raise InputError(
+                f"{field.name} has views of {field.width} x {field.height}; patches of {config.size} px need {side} px "
+                "each way with their margin: choose a smaller patch or leave this light field out."
+            )
+
+
 def sample_group(
     scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels, rng: np.random.Generator
 ) -> PatchGroup:
@@ -75,12 +88,10 @@ def sample_group(
     before_y, before_x, after_y, after_x = _draw_margins(reach, config.edge_share, rng)
     shape = before_y + config.size + after_y, before_x + config.size + after_x
     window = Window(before_y, before_y + config.size, before_x, before_x + config.size)
-    patches: list[FloatArray] = []
-    while len(patches) < config.group:
+    patches = []
+    for _ in range(config.group):
         scene = eligible[int(rng.integers(len(eligible)))]
-        views = _draw_views(scene, u, v, shape, levels, config, rng)
-        if views is not None:
-            patches.append(_draw_tone(views, config.tone_share, rng))
+        patches.append(_draw_tone(_draw_views(scene, u, v, shape, levels, config, rng), config.tone_share, rng))
     stack = np.stack(patches, 1)  # (5, B, H, W, 3): TL, BL, TR, BR, novel
     return _draw_symmetry(stack, window, float(u), float(v), rng)
 
@@ -115,22 +126,22 @@ def _draw_views(
     levels: Levels,
     config: PatchConfig,
     rng: np.random.Generator,
-) -> FloatArray | None:
-    """Five views (5, H, W, 3) of one sub-grid at one place, sheared; None where the picture is too small for them."""
+) -> FloatArray:
+    """Five views (5, H, W, 3) of one sub-grid at one place, sheared."""
     field = scene.light_field
     spacings = _spacings(scene, u, v)
     spacing = spacings[int(rng.choice(len(spacings), p=np.square(spacings) / np.sum(np.square(spacings))))]
     row0 = int(rng.integers(field.rows - spacing))
     column0 = int(rng.integers(field.columns - spacing))
     shear = _draw_shear(scene, spacing, levels, config.shear_spread, rng)
+    most = min(field.height - shape[0], field.width - shape[1]) // spacing  # what the picture has room for
+    shear = min(max(shear, -most), most)
     corners = [(int(q) * spacing, int(p) * spacing) for p, q in CORNERS]
     steps = [*corners, (int(v * spacing), int(u * spacing))]  # (row, column) in the sub-grid
 
     # Content that sits at x in view c is found at x + m c in the crop that starts at x0 - m c: its disparity grows by m k.
     reach = abs(shear) * spacing
     room_y, room_x = field.height - shape[0] - reach, field.width - shape[1] - reach
-    if room_y < 0 or room_x < 0:
-        return None
     best, best_score = None, -1.0
     for _ in range(config.candidates):
         y0 = int(rng.integers(room_y + 1)) + max(shear, 0) * spacing
