@@ -26,7 +26,7 @@ FADE_SECONDS = 0.12
 MAGNET_RADIUS = 0.012
 STOP_SECONDS = 10.0
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
-SYNTHESIS_NICENESS = 5
+SYNTHESIS_NICENESS = 2
 
 
 class Controller:

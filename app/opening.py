@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +24,9 @@ def synthesizer_factory(model: str) -> Callable[[], Synthesizer]:
     """What makes the synthesizer of the named model or weight file when called."""
 
     def make() -> Synthesizer:
+        # Threads of the networks that wait for each other sleep rather than spin: spinning ones would keep the frame loop,
+        # and each other, from the cores. Read when torch is loaded.
+        os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
         from lfcore.synthesizer import make_synthesizer
 
         return make_synthesizer(model)

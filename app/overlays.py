@@ -66,7 +66,7 @@ def missing(area: Rect, context: Context, readout: Readout) -> None:
 
 def legend(area: Rect, state: ViewState, readout: Readout) -> None:
     """The colour scale of the disparity or the error, with its units."""
-    if area.width < 22 * em() or area.height < 14 * em():
+    if area.width < 30 * em() or area.height < 20 * em():
         return
     if state.look is Look.DISPARITY and readout.disparity_range is not None and readout.grid is not None:
         low, high = readout.disparity_range

@@ -30,12 +30,14 @@ def draw(
     keyboard.run_pressed(context)
     state.dragging = state.dragging and imgui.is_mouse_down(0)
     size = picture_size(readout.grid, state.look)
+    covered = state.path_field or state.help
     if readout.grid is not None:
         picture.draw(area, state, size, scale)
         overlays.notices(area, state, readout)
         overlays.legend(area, state, readout)
-        overlays.missing(area, context, readout)
-    elif readout.loading is None:
+        if not covered:
+            overlays.missing(area, context, readout)
+    elif readout.loading is None and not covered:
         overlays.start(area, context, fonts)
     if layout.panel is not None:
         sidebar.draw(layout.panel, context, readout, fonts)

@@ -20,7 +20,6 @@ from app.controller import Controller
 from app.engine import Engine
 from app.frametimes import FrameTimes
 from app.interface import Interface
-from app.offscreen import measure_frames_offscreen
 from app.opening import open_by_content, synthesizer_factory
 from assets import sample_path
 from lfcore.errors import LfviewError
@@ -67,6 +66,8 @@ def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTime
             controller.open(path)
             return frametimes.measure(controller, window.poll_and_draw, seconds, "window")
     except NoDisplay:
+        from app.offscreen import measure_frames_offscreen
+
         return measure_frames_offscreen(path, seconds, model)
 
 
