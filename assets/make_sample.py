@@ -255,7 +255,7 @@ def main() -> None:
     parser.add_argument("--blender-python", type=Path, help="interpreter that has bpy 5.0.1")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "lfview_sample", help="folder for renders")
     parser.add_argument("--samples", type=int, default=16, help="per pixel, before denoising")
-    parser.add_argument("--webp-quality", type=int, default=92)
+    parser.add_argument("--webp-quality", type=int, default=93)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--preview", type=float, metavar="SCALE", help="only one view, at this fraction of the size")
     parser.add_argument("--develop-only", action="store_true", help="use the renders that are there")
