@@ -63,7 +63,8 @@ def where_in(corner: tuple[int, int], shift: Array) -> tuple[Array, Array]:
     return x + (corner[1] - NOVEL[1]) / last * shift, y + (corner[0] - NOVEL[0]) / last * shift
 
 
-def inside(picture: Array) -> Array:
+def inside(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The picture without its border."""
     return picture[BORDER:-BORDER, BORDER:-BORDER]
 
 
