@@ -88,8 +88,8 @@ class Canvas:
 
     def clear(self) -> None:
         """Forget the light field and everything that belongs to it."""
+        self._resting_place.use()
         if self._pictures is not None:
-            self._resting_place.use()
             self._pictures.release()
             self._pictures = None
 

@@ -7,6 +7,7 @@ readout to the panels.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,6 +25,7 @@ FADE_SECONDS = 0.12
 # A dragged viewpoint that comes to rest this near to a captured or a cached one goes there: no pixel of an ordinary light
 # field moves visibly by it, and the camera's view or the finished picture is there at once.
 MAGNET_RADIUS = 0.012
+PROGRESS_SECONDS = 0.15
 STOP_SECONDS = 10.0
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
 SYNTHESIS_NICENESS = 2
@@ -43,7 +45,7 @@ class Controller:
         self._model = model
         self._wake = wake
         self._loader: LatestWorker[LightField] = LatestWorker("loader", wake)
-        self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
+        self._synthesis: LatestWorker[Answer] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
         self._loading: Path | None = None
         self._load_ticket = 0
         self._loaded_share = 0.0
@@ -61,21 +63,19 @@ class Controller:
 
     # What the person asks for.
 
-    def start(self) -> None:
-        """Begin to load the model, in the synthesis thread."""
-
-        def prepare(cancelled: Cancel) -> None:
-            self._engine.prepare()
-
-        self._ticket = self._synthesis.submit(prepare)
-
     def open(self, path: Path) -> None:
         """Begin to open a light field; one that is still being opened is given up, the one on screen stays until then."""
 
         def load(cancelled: Cancel) -> LightField:
+            told_at = time.monotonic()
+
             def progress(share: float) -> None:
-                if not cancelled():
-                    self._loaded_share = share
+                nonlocal told_at
+                if cancelled():
+                    return
+                self._loaded_share = share
+                if time.monotonic() - told_at > PROGRESS_SECONDS:  # each telling costs a frame
+                    told_at = time.monotonic()
                     self._wake()
 
             light_field = self._open_light_field(path, progress, cancelled)
@@ -256,7 +256,7 @@ class Controller:
             answered = self._synthesis.outcomes.get()
             if not isinstance(answered, Done):
                 self.say(answered.message)
-            elif answered.value is not None and answered.ticket >= self._first_ticket:
+            elif answered.ticket >= self._first_ticket:
                 self._accept(answered.value)
 
     def _accept(self, answer: Answer) -> None:

@@ -30,6 +30,7 @@ SMALLEST_SIZE = (200, 150)
 MEBIBYTE = 2**20
 
 _SETTLE_FRAMES = 3  # imgui shows the effect of an event up to two frames later
+_WOKEN_FRAMES = 2
 _HOVER_SECONDS = 0.8  # after the last movement of the mouse, a tooltip may still appear
 _HOVER_INTERVAL = 0.1
 _CARET_INTERVAL = 0.25  # of a blinking caret
@@ -54,7 +55,6 @@ def show(path: Path, engine: Engine, model: str) -> None:
     """Open the window on the light field at `path` with this engine, and stay until it is closed."""
     with _window(engine, model) as (window, controller):
         window.draw()  # the first frame, before anything slow is imported
-        controller.start()
         controller.open(path)
         window.run()
 
@@ -152,8 +152,10 @@ class _Window:
                 glfw.wait_events_timeout(wait)
             else:
                 glfw.poll_events()
-            if time.monotonic() - before < wait or self._touched_at >= before:
+            if self._touched_at >= before:
                 frames_due = _SETTLE_FRAMES
+            elif time.monotonic() - before < wait:  # woken by a worker
+                frames_due = max(frames_due, _WOKEN_FRAMES)
             elif wait < _IDLE_INTERVAL:
                 frames_due = max(frames_due, 1)
 
