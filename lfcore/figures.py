@@ -14,7 +14,7 @@ from lfcore.lightfield import FloatArray
 
 ByteArray = npt.NDArray[np.uint8]
 
-_FONT = "DroidSans"  # comes with OpenImageIO
+FONT = "DroidSans"  # comes with OpenImageIO
 _FONT_SIZE = 15
 _LINE = 24  # height of a caption
 _MARGIN = 8
@@ -90,7 +90,7 @@ def _text_line(width: int, text: str, align: str) -> ByteArray:
     line = oiio.ImageBuf(oiio.ImageSpec(width, _LINE, 3, "float"))
     oiio.ImageBufAlgo.fill(line, (_BACKGROUND / 255,) * 3)
     x = 0 if align == "left" else width - 1
-    drawn = oiio.ImageBufAlgo.render_text(line, x, _LINE - 8, text, _FONT_SIZE, _FONT, (_INK,) * 3, align, "baseline")
+    drawn = oiio.ImageBufAlgo.render_text(line, x, _LINE - 8, text, _FONT_SIZE, FONT, (_INK,) * 3, align, "baseline")
     if not drawn:
         raise RuntimeError(f"OpenImageIO cannot draw text: {line.geterror()}")
     pixels = line.get_pixels(oiio.FLOAT)

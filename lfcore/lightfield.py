@@ -1,4 +1,4 @@
-"""The light field: a grid of views and their viewpoints. Axis order and the sense of (u, v) are defined here and nowhere else."""
+"""The light field: a grid of views and their viewpoints. Axis order and the sense of (u, v) are defined here alone."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def check_viewpoint(u: float, v: float) -> None:
     low, high = -EXTRAPOLATION_LIMIT, 1 + EXTRAPOLATION_LIMIT
     for name, value in (("u", u), ("v", v)):
         if not math.isfinite(value):
-            raise InputError(f"The viewpoint's {name} is {value}; it must be a number from {low} to {high} (corners at 0 and 1).")
+            raise InputError(f"The viewpoint's {name} is {value}; it must be a number from {low} to {high}.")
         if not low <= value <= high:
             raise InputError(f"The viewpoint's {name} is {value:g}; it must lie from {low} to {high} (corners at 0 and 1).")
 

@@ -85,16 +85,15 @@ def initialise(model: FullModel, seed: int) -> None:
             nn.init.zeros_(module.bias)
     stack = model.colour
     with torch.no_grad():
+        layers = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
         # Disparities are some ten times as large as colours: without this their random weights drown the average.
-        stack.hidden[0].weight[:, 0] *= 0.1
-        first = True
-        for layer in stack.hidden:
-            if isinstance(layer, nn.Conv2d):
-                centre = layer.kernel_size[0] // 2
-                layer.weight[: 3 * INPUTS] = 0
-                for channel in range(3 * INPUTS):
-                    layer.weight[channel, channel + 1 if first else channel, centre, centre] = 1
-                first = False
+        layers[0].weight[:, 0] *= 0.1
+        for layer in layers:
+            centre = layer.kernel_size[0] // 2
+            layer.weight[: 3 * INPUTS] = 0
+            for channel in range(3 * INPUTS):
+                # In the features of the first layer the disparity stands before the warped inputs.
+                layer.weight[channel, channel + (layer is layers[0]), centre, centre] = 1
         stack.last.weight *= 0.1
         for colour in range(3):
             stack.last.weight[colour, : 3 * INPUTS] = 0

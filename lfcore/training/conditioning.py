@@ -24,12 +24,14 @@ _DEVIATION_DIFFERENCES, _DEVIATION_SHARED = 20.0, 5.0
 class _ChannelMixing(nn.Module):
     """W = V T: (out, channels, kh, kw) -> the same shape."""
 
+    mixing: Tensor
+
     def __init__(self, mixing: Tensor) -> None:
         super().__init__()
         self.register_buffer("mixing", mixing, persistent=False)
 
     def forward(self, weight: Tensor) -> Tensor:
-        return torch.einsum("ocyx,cd->odyx", weight, self.mixing)  # type: ignore[arg-type]
+        return torch.einsum("ocyx,cd->odyx", weight, self.mixing)
 
 
 def mixing_matrix(levels: Levels) -> Tensor:
@@ -45,13 +47,20 @@ def mixing_matrix(levels: Levels) -> Tensor:
 
 def condition(model: FullModel) -> None:
     """Train the first layer of the disparity network in the better conditioned coordinates from now on."""
-    parametrize.register_parametrization(model.disparity.hidden[0], "weight", _ChannelMixing(mixing_matrix(model.config.levels)))
+    mixing = _ChannelMixing(mixing_matrix(model.config.levels))
+    parametrize.register_parametrization(_first_layer(model), "weight", mixing)
 
 
 def plain_copy(model: FullModel) -> FullModel:
     """The model with ordinary weights, float32 on the CPU."""
     plain = FullModel(model.config)
     state = {name: value for name, value in model.state_dict().items() if "parametrizations" not in name}
-    state["disparity.hidden.0.weight"] = model.disparity.hidden[0].weight.detach()
+    state["disparity.hidden.0.weight"] = _first_layer(model).weight.detach()
     plain.load_state_dict({name: value.float().cpu() for name, value in state.items()})
     return plain
+
+
+def _first_layer(model: FullModel) -> nn.Conv2d:
+    layer = model.disparity.hidden[0]
+    assert isinstance(layer, nn.Conv2d)
+    return layer

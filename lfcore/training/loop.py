@@ -21,6 +21,7 @@ from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
 from lfcore.errors import InputError
+from lfcore.export import write_picture
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16
 from lfcore.networks import BORDER, FullModel, colour_features, initialise
@@ -30,6 +31,7 @@ from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpo
 from lfcore.training.conditioning import condition, plain_copy
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, sample_group
+from lfcore.training.plot import plot
 from lfcore.warp import backward_warp
 from lfcore.weights import save_weights
 
@@ -108,7 +110,7 @@ def train(
     configuration.
     """
     keep_freed_memory()
-    trainer = _Trainer(config, _device(runtime.device), run_dir)
+    trainer = Trainer(config, _device(runtime.device), run_dir)
     prepared = [prepare_scene(scene) for scene in scenes]
     check_room(prepared, config.patches, FullModel().config.levels)
     began = last_validation = time.monotonic()
@@ -135,7 +137,7 @@ def train(
                 return
 
 
-class _Trainer:
+class Trainer:
     """Model, running average and optimiser of one run."""
 
     def __init__(self, config: TrainConfig, device: torch.device, run_dir: Path) -> None:
@@ -275,6 +277,7 @@ class _Trainer:
             asdict(self._config),
         )
         write_curve(self._run_dir, self._curve)
+        write_picture(self._run_dir / "curve.png", plot(self._curve))
 
     def _elapsed(self) -> float:
         return self._seconds + time.monotonic() - self._resumed

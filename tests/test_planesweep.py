@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+import torch
+from scenes import plane
+from slow import features as slow_features
+
+from lfcore.lightfield import CORNERS
+from lfcore.planesweep import Levels, Window, luminance, matching_disparity, plane_sweep
+from lfcore.synthesizer import corner_offsets, corner_tensor
+
+
+def random_luma(seed: int = 0, size: tuple[int, int] = (14, 17), batch: int = 1) -> torch.Tensor:
+    return torch.from_numpy(np.random.default_rng(seed).random((4, batch, *size)).astype(np.float32))
+
+
+@pytest.mark.parametrize(("u", "v"), [(0.5, 0.5), (0.0, 1.0), (0.3, 0.85), (-0.25, 1.25)])
+def test_features_equal_a_slow_computation_by_definition(u: float, v: float) -> None:
+    luma = random_luma()
+    levels = Levels(7, -21, 21)
+    found = plane_sweep(luma, corner_offsets(u, v), levels, Window(0, 14, 0, 17))[0]
+    offsets = corner_offsets(u, v).numpy().astype(np.float64)
+    for level, disparity in enumerate(np.linspace(-21, 21, 7)):
+        mean, deviation = slow_features(luma[:, 0].numpy().astype(np.float64), offsets, 0, 0, disparity)
+        np.testing.assert_allclose(found[level], mean, atol=2e-6)
+        np.testing.assert_allclose(found[7 + level], deviation, atol=2e-6)
+
+
+def test_no_sample_inside_the_picture_gives_zero_and_one_gives_no_deviation() -> None:
+    luma = random_luma(size=(10, 10))
+    found = plane_sweep(luma, corner_offsets(0.5, 0.5), Levels(2, -21, 21), Window(0, 10, 0, 10))[0]
+    assert torch.equal(found, torch.zeros(4, 10, 10))  # shifts by 10.5 px leave a picture of 10
+    found = plane_sweep(luma, corner_offsets(0, 0), Levels(2, -21, 21), Window(0, 10, 0, 10))[0]
+    torch.testing.assert_close(found[0], luma[0, 0])  # only the input at the viewpoint itself counts
+    assert torch.equal(found[2:], torch.zeros(2, 10, 10))
+
+
+def test_a_window_is_a_part_of_the_whole() -> None:
+    luma = random_luma(1, (40, 50))
+    offsets = corner_offsets(0.4, 0.1)
+    whole = plane_sweep(luma, offsets, Levels(), Window(0, 40, 0, 50))
+    part = plane_sweep(luma, offsets, Levels(), Window(11, 31, 0, 22))
+    torch.testing.assert_close(part, whole[:, :, 11:31, 0:22], atol=1e-6, rtol=0)
+
+
+def test_a_batch_is_its_members() -> None:
+    luma = random_luma(2, (30, 30), batch=3)
+    offsets = corner_offsets(0.7, 0.2)
+    window = Window(3, 27, 4, 30)
+    together = plane_sweep(luma, offsets, Levels(), window)
+    for k in range(3):
+        torch.testing.assert_close(together[k : k + 1], plane_sweep(luma[:, k : k + 1], offsets, Levels(), window))
+
+
+def test_deviation_vanishes_at_the_disparity_of_a_plane() -> None:
+    levels = Levels(43, -21, 21)  # whole pixels
+    field = plane(5.0, size=(80, 90))
+    luma = luminance(corner_tensor(field)).unsqueeze(1)
+    found = plane_sweep(luma, corner_offsets(0.5, 0.5), levels, Window(20, 60, 20, 70))[0]
+    mean_deviation = found[43:].mean((1, 2))
+    assert int(mean_deviation.argmin()) == 21 + 5
+    assert float(mean_deviation.min()) < 2e-3 < 0.02 < float(mean_deviation.median())
+
+
+def test_the_best_match_of_a_plane_is_its_disparity() -> None:
+    field = plane(-6.0, size=(100, 100))
+    luma = luminance(corner_tensor(field)).unsqueeze(1)
+    target = luminance(torch.from_numpy(field.view(1, 1)).permute(2, 0, 1))[None, 25:75, 25:75]
+    levels = Levels()
+    disparity, confidence = matching_disparity(luma, corner_offsets(0.5, 0.5), levels, Window(25, 75, 25, 75), target)
+    spacing = 42 / 99
+    assert float((disparity + 6).abs().max()) <= spacing
+    assert float(confidence.min()) > 0.5
+
+
+def test_luminance_weighs_the_channels() -> None:
+    colours = torch.eye(3).view(3, 3, 1, 1)
+    assert luminance(colours).flatten().tolist() == pytest.approx([0.2989, 0.5870, 0.1140])
+    assert len(CORNERS) == 4

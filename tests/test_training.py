@@ -1,0 +1,176 @@
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from scenes import plane
+
+from lfcore.errors import InputError
+from lfcore.export import write_picture
+from lfcore.lightfield import LightField
+from lfcore.planesweep import Levels
+from lfcore.synthesizer import corner_offsets
+from lfcore.training.curve import CurvePoint, write_curve
+from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, learning_rate, prepare_scene, train
+from lfcore.training.patches import PatchConfig, TrainingScene, margin, sample_group
+from lfcore.training.plot import plot
+from lfcore.warp import backward_warp
+from lfcore.weights import load_weights
+
+LEVELS = Levels()
+SMALL = PatchConfig(size=32, batch=2, group=2, tone_share=0.0)
+
+
+def scene(disparity: float, grid: tuple[int, int] = (4, 4), size: tuple[int, int] = (130, 150)) -> TrainingScene:
+    return TrainingScene(plane(disparity, grid, size), disparity, disparity)
+
+
+def test_the_range_of_disparities_is_found() -> None:
+    for disparity in (-7.0, 4.0):
+        field = plane(disparity, (3, 3), (120, 130))
+        found = prepare_scene(field)
+        assert found.low == pytest.approx(disparity, abs=0.5)
+        assert found.high == pytest.approx(disparity, abs=0.5)
+
+
+def test_a_pair_of_views_cannot_be_trained_on() -> None:
+    with pytest.raises(InputError, match="3 x 3"):
+        prepare_scene(plane(1.0, (2, 2)))
+
+
+def test_patches_agree_with_their_inputs_under_shear_symmetry_and_tone() -> None:
+    """Warped by its own disparity, each input of a patch of a plane equals the novel view, whatever was done to the patch."""
+    config = PatchConfig(size=32, batch=4, group=2, tone_share=0.5, shear_spread=8)
+    scenes = [scene(3.0, (5, 5))]
+    disparities = set()
+    for step in range(12):
+        group = sample_group(scenes, config, LEVELS, np.random.default_rng((1, step)))
+        inputs, target = torch.from_numpy(group.inputs), torch.from_numpy(group.target)
+        offsets = corner_offsets(group.u, group.v)
+        top, left = group.window.top, group.window.left
+        errors = {}
+        for candidate in np.arange(-21, 21.01, 0.25):
+            disparity = torch.full((1, 1, 32, 32), float(candidate))
+            warped = torch.cat([backward_warp(inputs[i, :1], disparity, offsets[i : i + 1], (top, left)) for i in range(4)])
+            seen = (warped != 0).all(1, keepdim=True)
+            if int(seen.sum()) > 1000:
+                errors[float(candidate)] = float(((warped - target[:1]).abs() * seen).sum() / (3 * seen.sum()))
+        best = min(errors, key=errors.__getitem__)
+        assert errors[best] < 0.01, step
+        disparities.add(best)
+    assert len(disparities) > 3  # shears widen what one plane teaches
+    assert min(disparities) < 0 < max(disparities)
+
+
+def test_all_novel_positions_of_all_sub_grids_are_drawn_but_no_corner() -> None:
+    drawn = set()
+    for step in range(400):
+        group = sample_group([scene(1.0)], SMALL, LEVELS, np.random.default_rng((2, step)))
+        drawn.add((round(group.u * 6), round(group.v * 6)))
+    thirds = {(2 * a, 2 * b) for a, b in itertools.product(range(4), repeat=2)}
+    halves = {(3 * a, 3 * b) for a, b in itertools.product(range(3), repeat=2)}
+    corners = {(6 * a, 6 * b) for a, b in itertools.product(range(2), repeat=2)}
+    assert drawn == (thirds | halves) - corners
+
+
+def test_a_group_depends_on_the_state_of_its_generator_alone() -> None:
+    a, b, c = (sample_group([scene(1.0)], SMALL, LEVELS, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(a.inputs, b.inputs)
+    assert (a.u, a.v, a.window) == (b.u, b.v, b.window)
+    assert a.inputs.shape != c.inputs.shape or not np.array_equal(a.inputs, c.inputs)
+
+
+def test_the_margin_holds_every_sample_of_the_sweep() -> None:
+    assert margin(LEVELS) >= 21 + 2
+
+
+def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None) -> list[Progress]:
+    config = TrainConfig(steps=steps, decay_share=0, matching_steps=3, patches=SMALL)
+    reports: list[Progress] = []
+    train(
+        config,
+        Runtime(device="cpu"),
+        [plane(2.0, (3, 3), (120, 120)), plane(-3.0, (3, 3), (120, 120))],
+        [plane(1.0, (3, 3), (72, 72))],
+        tmp_path / f"{run}.safetensors",
+        tmp_path / run,
+        reports.append,
+        lambda: stop_at is not None and len(reports) + 1 >= stop_at,
+    )
+    return reports
+
+
+def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path) -> None:
+    train_small(tmp_path, 5, "straight")
+    first = train_small(tmp_path, 5, "halved", stop_at=2)
+    second = train_small(tmp_path, 5, "halved")
+    assert [p.step for p in first] == [1, 2]
+    assert [p.step for p in second] == [3, 4, 5]
+    straight = load_weights(tmp_path / "straight.safetensors").model.state_dict()
+    halved = load_weights(tmp_path / "halved.safetensors").model.state_dict()
+    last = [load_checkpoint_tensors(tmp_path / run) for run in ("straight", "halved")]
+    for name in last[0]:
+        torch.testing.assert_close(last[0][name], last[1][name], atol=1e-6, rtol=1e-5)
+    assert straight.keys() == halved.keys()
+
+
+def load_checkpoint_tensors(run: Path) -> dict[str, torch.Tensor]:
+    from safetensors.torch import load_file
+
+    return load_file(run / "checkpoint.safetensors")
+
+
+def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_path: Path) -> None:
+    train_small(tmp_path, 1, "run")
+    config = TrainConfig(steps=2, decay_share=0, matching_steps=3, patches=SMALL, learning_rate=5e-3)
+    scenes = [plane(2.0, (3, 3), (120, 120))]
+    arguments = (scenes, [], tmp_path / "o.safetensors", tmp_path / "run", lambda p: None, lambda: False)
+    with pytest.raises(InputError, match="learning_rate"):
+        train(config, Runtime(device="cpu"), *arguments)
+    path = tmp_path / "run" / "checkpoint.safetensors"
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(InputError, match="not a readable checkpoint"):
+        train(config, Runtime(device="cpu"), *arguments)
+
+
+def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path) -> None:
+    config = TrainConfig(learning_rate=3e-4, warm_up_steps=1, matching_steps=0, patches=SMALL)
+    trainer = Trainer(config, torch.device("cpu"), tmp_path)
+    groups = trainer.draw([scene(5.0)], 0)
+    errors = [trainer.take_step(groups) for _ in range(30)]
+    assert errors[-1] < 0.5 * errors[0]
+
+
+def test_the_learning_rate_rises_stays_and_falls() -> None:
+    config = TrainConfig(steps=1000, learning_rate=1e-3, warm_up_steps=10, decay_share=0.5)
+    rates = [learning_rate(config, step) for step in range(1001)]
+    assert rates[0] == pytest.approx(1e-4)
+    assert rates[10] == rates[500] == 1e-3
+    assert rates[1000] == pytest.approx(1e-5)
+    assert all(a >= b for a, b in itertools.pairwise(rates[500:]))
+
+
+def test_the_curve_is_written_as_table_and_picture(tmp_path: Path) -> None:
+    curve = [CurvePoint(k, 60.0 * k, 1e-4, 0.01 / k, {"a": 20.0 + k, "b": 22.0 + k}) for k in range(1, 6)]
+    write_curve(tmp_path, curve)
+    write_picture(tmp_path / "curve.png", plot(curve))
+    lines = (tmp_path / "curve.csv").read_text().splitlines()
+    assert lines[0] == "step,seconds,learning_rate,loss,a,b"
+    assert lines[5].split(",")[-2:] == ["25.000", "27.000"]
+    picture = plot(curve).astype(int)
+    bluest, reddest = (picture[..., 2] - picture[..., 0]), (picture[..., 0] - picture[..., 2])
+    # Two rising lines, one above the other by 2 dB, each in its colour.
+    assert (bluest > 100).sum() > 500 and (reddest > 100).sum() > 500
+    heights = [np.nonzero((colour[60:, 70:] > 100).any(1))[0] for colour in (bluest, reddest)]
+    assert heights[0].min() > heights[1].min()
+    assert plot([]).shape == picture.shape
+    assert curve[0].mean == 22.0 and CurvePoint(1, 1, 1, 1, {}).mean == -math.inf
+
+
+def test_scenes_too_small_for_the_patch_are_refused_in_words(tmp_path: Path) -> None:
+    field = LightField(np.zeros((3, 3, 60, 60, 3), np.uint8), "tiny", "", "")
+    with pytest.raises(InputError, match="tiny"):
+        out, run = tmp_path / "o.safetensors", tmp_path / "r"
+        train(TrainConfig(steps=1), Runtime(device="cpu"), [field], [], out, run, print, lambda: False)
