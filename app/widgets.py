@@ -105,7 +105,7 @@ def wrapped(words: str, colour: ImVec4 = theme.TEXT) -> None:
 def heading(words: str, fonts: theme.Fonts) -> None:
     """The title of a section, with a rule above it."""
     spacing = imgui.get_style().item_spacing
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, em() * 0.5))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, em() * 0.38))
     imgui.dummy(ImVec2(0, 0))
     imgui.separator()
     imgui.pop_style_var()
