@@ -1,0 +1,98 @@
+# `make run` opens the viewer, `make test` checks everything; both set up what they need, in this folder alone.
+
+SHELL := /bin/sh
+.SHELLFLAGS := -eu -c
+.DEFAULT_GOAL := run
+
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+FILE ?= assets/sample
+FRAMES ?= 24
+OUT := out
+
+# Debian's names of what a window needs, and of what the tests need besides.
+WINDOW_PACKAGES := libgl1 libegl1 libgl1-mesa-dri libglx-mesa0 libx11-6 libxext6 libxrandr2 libxinerama1 libxcursor1 libxi6 libxkbcommon0
+TEST_PACKAGES := xvfb xdotool
+
+.PHONY: run test lint clean window-packages test-packages
+
+run: $(VENV)/ready window-packages
+	@if [ -n "$${DISPLAY:-}$${WAYLAND_DISPLAY:-}" ] || [ "$$(uname -s)" = Darwin ]; then \
+		exec $(PYTHON) -m app view "$(FILE)"; \
+	fi; \
+	echo "There is no display here, so the same is done off screen: $(OUT)/viewer.png and $(OUT)/sweep.mp4."; \
+	mkdir -p $(OUT); \
+	$(PYTHON) -m app view "$(FILE)" --screenshot $(OUT)/viewer.png; \
+	$(PYTHON) -m app sweep "$(FILE)" --path circle --frames $(FRAMES) --out $(OUT)/sweep.mp4; \
+	echo "Written: $(OUT)/viewer.png and $(OUT)/sweep.mp4."
+
+test: $(VENV)/ready-for-tests window-packages test-packages
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/mypy
+	$(PYTHON) -m pytest
+
+lint: $(VENV)/ready-for-tests
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/mypy
+
+clean:
+	rm -rf $(VENV) $(OUT) build *.egg-info
+
+# The program is installed in place, in the versions of constraints.txt; touched last, so that a broken set-up is done again.
+$(VENV)/ready: pyproject.toml constraints.txt
+	@$(find_python); \
+	$(make_venv); \
+	echo "Setting up in $(VENV) (once; about 1.3 GB, most of it torch) ..."; \
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .; \
+	touch $@
+
+$(VENV)/ready-for-tests: $(VENV)/ready
+	@$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@touch $@
+
+define find_python
+python=; \
+for name in $${PYTHON3:-} python3 python3.13 python3.12 python3.11; do \
+	if command -v $$name >/dev/null 2>&1 && $$name -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; then \
+		python=$$name; break; \
+	fi; \
+done; \
+if [ -z "$$python" ]; then \
+	echo "Python 3.11, 3.12 or 3.13 was not found; install one of them, or name it: make run PYTHON3=/path/to/python3" >&2; exit 2; \
+fi
+endef
+
+define make_venv
+if ! $$python -m venv $(VENV) >/dev/null 2>&1; then \
+	$(call apt_install,python3-venv); \
+	$$python -m venv $(VENV); \
+fi
+endef
+
+# $(call apt_install,PACKAGES): install them, or say in one sentence what is missing. Never asks for a password.
+define apt_install
+echo "Installing $(1) ..."; \
+if command -v apt-get >/dev/null 2>&1 && [ "$$(id -u)" = 0 ]; then \
+	apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null; \
+elif command -v apt-get >/dev/null 2>&1 && sudo -n true 2>/dev/null; then \
+	sudo apt-get update -qq && sudo DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null; \
+else \
+	echo "These are needed and could not be installed from here: $(1) (Debian's names); install them and run this again." >&2; exit 2; \
+fi
+endef
+
+# The libraries are looked for by name, for on a desktop another package or vendor may have brought them.
+window-packages:
+	@if [ "$$(uname -s)" = Linux ]; then \
+		found=$$( (ldconfig -p || /sbin/ldconfig -p) 2>/dev/null ); \
+		for library in libGL.so.1 libEGL.so.1 libX11.so.6 libXext.so.6 libXrandr.so.2 libXinerama.so.1 libXcursor.so.1 libXi.so.6 libxkbcommon.so.0; do \
+			case "$$found" in *$$library*) ;; *) $(call apt_install,$(WINDOW_PACKAGES)); break ;; esac; \
+		done; \
+	fi
+
+test-packages:
+	@if [ "$$(uname -s)" = Linux ]; then \
+		for program in Xvfb xdotool; do \
+			command -v $$program >/dev/null 2>&1 || { $(call apt_install,$(TEST_PACKAGES)); break; }; \
+		done; \
+	fi
