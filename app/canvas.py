@@ -21,10 +21,10 @@ from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray
 
 GL_VERSION = 330
-DISPLAY_TONE = (1 / 1.5, 1.5)  # exponent and saturation by which the paper's authors show dark captures
 BACKGROUND = (0.055, 0.058, 0.063)
 _TEXTURE_TYPES = {"uint8": "f1", "uint16": "nu2", "float32": "f4"}  # numpy type to moderngl's normalised texture type
 
+_TONES = {False: "tone_stored.glsl", True: "tone_bright.glsl"}  # by Frame.display_tone
 # Corner (index into CORNERS) to its place (column, row) on the sheet of all four.
 _SHEET_PLACES = tuple((int(u), int(v)) for u, v in CORNERS)
 
@@ -64,7 +64,7 @@ class Canvas:
         self._instant = _Pass(context, "instant.frag")
         self._warped = _Pass(context, "warped.frag")
         self._fade = _Pass(context, "fade.frag")
-        self._shows: dict[tuple[str, str], _Pass] = {}  # by fragment shader and way of sampling, made when first used
+        self._shows: dict[tuple[str, str, str], _Pass] = {}  # by fragment shader, sampling and tone, made when first used
         colours = colormaps.disparity_colours()  # (256, 3)
         self._colours = context.texture((len(colours), 1), 3, colours.tobytes(), alignment=1)
         self._colours.repeat_x = self._colours.repeat_y = False
@@ -183,19 +183,20 @@ class Canvas:
         pictures = self._at_hand
         if frame.look is Look.DISPARITY:
             textures: Mapping[str, _AnyTexture] = {"disparity": pictures.disparity, "colours": self._colours}
-            self._show_pass("show_disparity.frag", sampling).render(textures, {**placed, "range": frame.disparity_range})
+            show = self._show_pass("show_disparity.frag", sampling)
+            show.render(textures, {**placed, "range": frame.disparity_range})
         elif frame.look is Look.ERROR:
             textures = {"picture": self._picture_of(frame), "captured": pictures.captured}
-            self._show_pass("show_error.frag", sampling).render(textures, {**placed, "gain": frame.gain})
+            show = self._show_pass("show_error.frag", sampling)
+            show.render(textures, {**placed, "gain": frame.gain})
         else:
-            exponent, saturation = DISPLAY_TONE if frame.display_tone else (1.0, 1.0)
-            tone: dict[str, Uniform] = {"dim": frame.dim, "tone_exponent": exponent, "tone_saturation": saturation}
-            self._show_pass("show_image.frag", sampling).render({"picture": self._picture_of(frame)}, {**placed, **tone})
+            show = self._show_pass("show_image.frag", sampling, _TONES[frame.display_tone])
+            show.render({"picture": self._picture_of(frame)}, {**placed, "dim": frame.dim})
 
-    def _show_pass(self, fragment: str, sampling: str) -> _Pass:
-        key = (fragment, sampling)
+    def _show_pass(self, fragment: str, sampling: str, tone: str = "") -> _Pass:
+        key = (fragment, sampling, tone)
         if key not in self._shows:
-            self._shows[key] = _Pass(self.context, fragment, {"sampled.glsl": sampling})
+            self._shows[key] = _Pass(self.context, fragment, {"sampled.glsl": sampling, "tone.glsl": tone})
         return self._shows[key]
 
     def _picture_of(self, frame: Frame) -> moderngl.Texture:
