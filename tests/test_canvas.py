@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from moving_scene import DISPARITY, SIZE, truth
 
 from app import glsl
 from app.canvas import BACKGROUND, Canvas, Frame, Target
@@ -16,7 +17,6 @@ from app.state import Look, Rect, Zoom, place
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray, as_float
-from tests.moving_scene import DISPARITY, SIZE, truth
 
 HEIGHT, WIDTH = SIZE
 VIEWPOINTS = ((0.3, 0.4), (0.0, 1.0), (-0.2, 1.1))

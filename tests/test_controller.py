@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
 from app.controller import FADE_SECONDS, MAGNET_RADIUS, REST_SECONDS, Controller
 from app.engine import Engine, disparity_range
@@ -15,7 +16,6 @@ from app.worker import Cancel
 from lfcore.errors import InputError, WeightsError
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16
-from tests.moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
 PATIENCE = 10.0
 Progress = Callable[[float], None]

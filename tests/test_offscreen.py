@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from moving_scene import SIZE, TruthSynthesizer, light_field, truth
 
 from app import offscreen
 from app.interface import path_from_text
@@ -15,7 +16,6 @@ from app.layout import lay_out
 from app.state import Zoom, place
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray
-from tests.moving_scene import SIZE, TruthSynthesizer, light_field, truth
 
 WINDOW = (900, 600)
 

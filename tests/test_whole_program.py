@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from moving_scene import DISPARITY, light_field, truth
+from virtual_screen import SIZE, VirtualScreen, missing_tools, virtual_screen, wait_until
 
 from app.layout import lay_out
 from app.picture import DRAG_SPAN
 from app.state import Zoom, place
 from lfcore import colormaps
 from lfcore.lightfield import FloatArray, LightField
-from tests.moving_scene import DISPARITY, light_field, truth
-from tests.virtual_screen import SIZE, VirtualScreen, missing_tools, virtual_screen, wait_until
 
 ROOT = Path(__file__).parents[1]
 VIEW = (240, 320)  # (H, W)
@@ -32,7 +32,7 @@ import sys
 from pathlib import Path
 from app.engine import Engine
 from app.viewer import show
-from tests.moving_scene import TruthSynthesizer
+from moving_scene import TruthSynthesizer
 show(Path(sys.argv[1]), Engine(lambda: TruthSynthesizer(0.5), 2**26), "truth")
 """
 
