@@ -32,7 +32,7 @@ import sys
 from pathlib import Path
 from app.engine import Engine
 from app.viewer import show
-from moving_scene import TruthSynthesizer
+from tests.moving_scene import TruthSynthesizer
 show(Path(sys.argv[1]), Engine(lambda: TruthSynthesizer(0.5), 2**26), "truth")
 """
 
