@@ -92,8 +92,12 @@ def matching_disparity(
     """
     costs = []
     for shifted in _shifted_inputs(luma, offsets, levels, window):
-        difference = torch.stack([(part.image - target[(slice(None), *part.window)]).abs() for part in shifted])
-        costs.append(difference.sort(0).values[:2].mean(0))
+        least, second = target.new_full(target.shape, math.inf), target.new_full(target.shape, math.inf)
+        for part in shifted:
+            difference = (part.image - target).abs_()
+            second = torch.minimum(second, torch.maximum(least, difference))
+            least = torch.minimum(least, difference)
+        costs.append(least.add_(second).mul_(0.5))
     cost = F.avg_pool2d(torch.stack(costs, 1), box, stride=1, padding=box // 2, count_include_pad=False)  # (B, L, h, w)
     best, index = cost.min(1, keepdim=True)
     typical = cost.mean(1, keepdim=True)

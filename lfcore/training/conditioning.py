@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.utils import parametrize
 
-from lfcore.networks import FullModel
+from lfcore.networks import FullModel, initialise
 from lfcore.planesweep import Levels
 
 # Of means and of deviations: how much their differences between levels grow, and what becomes of what all levels share.
@@ -25,13 +25,19 @@ class _ChannelMixing(nn.Module):
     """W = V T: (out, channels, kh, kw) -> the same shape."""
 
     mixing: Tensor
+    unmixing: Tensor
 
     def __init__(self, mixing: Tensor) -> None:
         super().__init__()
         self.register_buffer("mixing", mixing, persistent=False)
+        self.register_buffer("unmixing", torch.linalg.inv(mixing.double()).float(), persistent=False)
 
     def forward(self, weight: Tensor) -> Tensor:
         return torch.einsum("ocyx,cd->odyx", weight, self.mixing)
+
+    def right_inverse(self, weight: Tensor) -> Tensor:
+        """The V of a given W: how weights that are there already are gone on from."""
+        return torch.einsum("ocyx,cd->odyx", weight, self.unmixing)
 
 
 def mixing_matrix(levels: Levels) -> Tensor:
@@ -49,6 +55,14 @@ def condition(model: FullModel) -> None:
     """Train the first layer of the disparity network in the better conditioned coordinates from now on."""
     mixing = _ChannelMixing(mixing_matrix(model.config.levels))
     parametrize.register_parametrization(_first_layer(model), "weight", mixing)
+
+
+def initialise_conditioned(model: FullModel, seed: int) -> None:
+    """Xavier initialisation of V, not of W: of the weights on the enlarged features."""
+    initialise(model, seed)
+    layer = _first_layer(model)
+    with torch.no_grad():
+        layer.weight.copy_(torch.einsum("ocyx,cd->odyx", layer.weight, mixing_matrix(model.config.levels)))
 
 
 def plain_copy(model: FullModel) -> FullModel:

@@ -24,16 +24,16 @@ from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16
-from lfcore.networks import BORDER, FullModel, colour_features, initialise
+from lfcore.networks import BORDER, FullModel, colour_features
 from lfcore.planesweep import Window, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import NetworkSynthesizer, corner_offsets, corner_tensor, fastest_dtype
 from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from lfcore.training.conditioning import condition, plain_copy
+from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, sample_group
 from lfcore.training.plot import plot
 from lfcore.warp import backward_warp
-from lfcore.weights import save_weights
+from lfcore.weights import load_weights, save_weights
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class TrainConfig:
     decay_share: float = 0.3  # of the steps, at the end, in which the learning rate falls to a hundredth
     matching_steps: int = 1000  # in which the disparity is also drawn to the plane sweep's best match (see matching_disparity)
     matching_weight: float = 0.03
+    balance: float = 0.0  # a patch's squared error is divided by (its variance + 0.005) ** balance; 0 is the paper's loss
+    initial: str = ""  # weights to go on from; empty: Xavier initialisation
     average: float = 0.999  # decay of the running average of the weights; the average is what is validated and shipped
     seed: int = 1
     patches: PatchConfig = field(default_factory=PatchConfig)
@@ -145,7 +147,10 @@ class Trainer:
         self._device = device
         self._run_dir = run_dir
         self._model = FullModel()
-        initialise(self._model, config.seed)
+        if config.initial:
+            self._model.load_state_dict(load_weights(Path(config.initial)).model.state_dict())
+        else:
+            initialise_conditioned(self._model, config.seed)
         condition(self._model)
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
@@ -206,13 +211,15 @@ class Trainer:
         with self._autocast():
             image = self._model.colour(h.contiguous(memory_format=torch.channels_last))  # (B, 3, P - 24, P - 24)
         inside = slice(2 * BORDER, -2 * BORDER)
-        squared_error = F.mse_loss(image, targets[:, :, inside, inside])
-        loss = squared_error
+        inner = targets[:, :, inside, inside]
+        errors = (image - inner).square().mean((1, 2, 3))  # (B,)
+        # Dark and flat patches have small errors; balanced, they teach as much as bright ones.
+        loss = (errors / (inner.var((1, 2, 3)) + 0.005) ** self._config.balance).mean()
         fading = 1 - self.step / max(self._config.matching_steps, 1)
         if fading > 0:
             matching = self._matching_loss(groups, lumas, offsets, luminance(targets), pieces)
             loss = loss + self._config.matching_weight * fading * matching
-        return squared_error.detach(), loss
+        return errors.detach().mean(), loss
 
     def _matching_loss(
         self,
@@ -223,7 +230,6 @@ class Trainer:
         disparities: Sequence[Tensor],
     ) -> Tensor:
         """Distance of the disparity from the level at which the inputs match the novel view best, where that is clear."""
-        total = torch.zeros((), device=self._device)
         inside = slice(BORDER, -BORDER)
         pieces = targets.split([d.shape[0] for d in disparities])
         for luma, o, group, target, disparity in zip(lumas, offsets, groups, pieces, disparities, strict=True):
@@ -232,9 +238,8 @@ class Trainer:
                 continue  # at an edge of the picture not all samples count
             found, confidence = matching_disparity(luma, o, self._model.config.levels, w, target)
             error = F.smooth_l1_loss(disparity, found[:, :, inside, inside], reduction="none")
-            weighted = confidence[:, :, inside, inside] * error
-            total = total + weighted.mean() / len(groups)
-        return total
+            return (confidence[:, :, inside, inside] * error).mean()  # one group a step is enough, and costs less than all
+        return torch.zeros((), device=self._device)
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast(self._device.type, dtype=torch.bfloat16, enabled=self._bfloat16)

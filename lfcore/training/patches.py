@@ -181,7 +181,8 @@ def _draw_tone(views: FloatArray, share: float, rng: np.random.Generator) -> Flo
     """The same tone for all five views: order of the channels, gains, exposure, gamma."""
     if rng.random() >= share:
         return views
-    gamma = float(np.exp(np.clip(rng.normal(0, 0.4), -0.8, 0.8)))
+    # More darker than brighter: an ESLF holds linear values, far darker than the pictures that most scenes come as.
+    gamma = float(np.exp(np.clip(rng.normal(0.2, 0.45), -0.8, 1.0)))
     gains = (rng.uniform(0.7, 1.25) * rng.uniform(0.9, 1.1, 3)).astype(np.float32)
     toned: FloatArray = np.minimum(np.power(views[..., rng.permutation(3)], np.float32(gamma)) * gains, 1)
     return toned
