@@ -116,6 +116,19 @@ def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path) -> None:
     assert straight.keys() == halved.keys()
 
 
+def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None:
+    train_small(tmp_path, 1, "first")
+    given = load_weights(tmp_path / "first.safetensors")
+    config = TrainConfig(steps=1, learning_rate=1e-9, warm_up_steps=0, matching_steps=0, patches=SMALL)
+    out, run = tmp_path / "second.safetensors", tmp_path / "second"
+    scenes = [plane(2.0, (3, 3), (120, 120))]
+    train(config, Runtime(device="cpu"), scenes, [], out, run, lambda p: None, lambda: False, given)
+    found = load_weights(out)
+    assert found.training["config"]["initial"] == given.digest
+    for name, value in given.model.state_dict().items():  # next to nothing was learnt, so the weights are those given
+        torch.testing.assert_close(found.model.state_dict()[name], value, atol=1e-5, rtol=1e-4)
+
+
 def load_checkpoint_tensors(run: Path) -> dict[str, torch.Tensor]:
     from safetensors.torch import load_file
 

@@ -89,6 +89,15 @@ def positive(text: str) -> float:
     raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
 
 
+def share(text: str) -> float:
+    """Parse a number from 0 to 1."""
+    with contextlib.suppress(ValueError):
+        value = float(text)
+        if 0 <= value <= 1:
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r} is not a number from 0 to 1")
+
+
 def open_with_progress(path: Path, views: int = 8) -> LightField:
     """Open a light field, with a bar on a terminal."""
     from lfcore.formats import open_light_field

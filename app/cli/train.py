@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb, count, open_with_progress, positive, scenes_in
+from app.cli.common import Verbs, add_verb, count, open_with_progress, positive, scenes_in, share
 from app.progress import bar, clock
 from lfcore.errors import InputError
 
@@ -56,6 +56,15 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--patch", type=count, metavar="PX", default=60, help="side of a training patch (default: 60)")
     parser.add_argument("--batch", type=count, metavar="N", default=20, help="patches a step, a multiple of 4 (default: 20)")
     parser.add_argument("--lr", type=positive, metavar="R", default=1e-4, help="learning rate (default: 1e-4)")
+    parser.add_argument("--decay", type=share, metavar="F", default=0.3, help="last share of the steps, of a falling rate (0.3)")
+    parser.add_argument(
+        "--balance", type=share, metavar="F", default=0.0, help="0: the paper's loss (default); to 1: dark patches weigh more"
+    )
+    parser.add_argument(
+        "--matching", type=int, metavar="N", default=1000, help="first steps that also match planes (default: 1000)"
+    )
+    parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
+    parser.add_argument("--init", metavar="FILE", type=Path, help="weights to go on from, in place of random ones")
     parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
     parser.add_argument(
         "--run-dir",
@@ -80,12 +89,14 @@ def run(options: argparse.Namespace) -> int:
 
     from lfcore.export import make_folder
     from lfcore.training.loop import Runtime, train
+    from lfcore.weights import load_weights
 
     config = _config(options)
     if options.device == "cuda" and not torch.cuda.is_available():
         raise InputError("There is no CUDA device that torch can use here; train with --device cpu or auto.")
     if options.threads:
         torch.set_num_threads(options.threads)
+    initial = load_weights(options.init) if options.init else None
     scenes, validation = _open_all(data), _open_all(held_out)
     reporter = _Reporter()
     with _stop_on_signal() as stop:
@@ -98,6 +109,7 @@ def run(options: argparse.Namespace) -> int:
             make_folder(run_dir),
             reporter,
             stop,
+            initial,
         )
     reporter.finish()
     if stop.number is not None:
@@ -112,11 +124,18 @@ def _config(options: argparse.Namespace) -> TrainConfig:
     from lfcore.training.patches import PatchConfig
 
     try:
-        patches = PatchConfig(size=options.patch, batch=options.batch)
+        patches = PatchConfig(size=options.patch, batch=options.batch, tone_share=options.tones)
     except ValueError as error:
         raise InputError(f"--patch {options.patch} --batch {options.batch} will not do: {error}.") from error
     return TrainConfig(
-        steps=options.steps, learning_rate=options.lr, seed=options.seed, patches=patches, model=options.model
+        steps=options.steps,
+        learning_rate=options.lr,
+        decay_share=options.decay,
+        matching_steps=options.matching,
+        balance=options.balance,
+        seed=options.seed,
+        patches=patches,
+        model=options.model,
     )
 
 

@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +33,7 @@ from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, sample_group
 from lfcore.training.plot import plot
 from lfcore.warp import backward_warp
-from lfcore.weights import load_weights, save_weights
+from lfcore.weights import Weights, save_weights
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class TrainConfig:
     matching_steps: int = 1000  # in which the disparity is also drawn to the plane sweep's best match (see matching_disparity)
     matching_weight: float = 0.03
     balance: float = 0.0  # a patch's squared error is divided by (its variance + 0.005) ** balance; 0 is the paper's loss
-    initial: str = ""  # weights to go on from; empty: Xavier initialisation
+    initial: str = ""  # digest of the weights to go on from; empty: Xavier initialisation
     average: float = 0.999  # decay of the running average of the weights; the average is what is validated and shipped
     seed: int = 1
     patches: PatchConfig = field(default_factory=PatchConfig)
@@ -104,15 +104,19 @@ def train(
     run_dir: Path,
     report: Callable[[Progress], None],
     stopped: Callable[[], bool],
+    initial: Weights | None = None,
 ) -> None:
-    """Train until `config.steps`, `runtime.stop_after_minutes` or `stopped()`; go on from `run_dir` if it holds a checkpoint.
+    """Train from `initial` or anew until `config.steps`, `runtime.stop_after_minutes` or `stopped()`; if `run_dir` holds a
+    checkpoint, go on from there.
 
     Writes `out` (the averaged weights that scored best on `validation`, or the newest where there is none), and in `run_dir`
     checkpoint.safetensors, curve.csv and curve.png. Raises InputError for scenes too small and for a checkpoint of another
     configuration.
     """
     keep_freed_memory()
-    trainer = Trainer(config, _device(runtime.device), run_dir)
+    if initial is not None:
+        config = replace(config, initial=initial.digest)
+    trainer = Trainer(config, _device(runtime.device), run_dir, initial.model if initial else None)
     prepared = [prepare_scene(scene) for scene in scenes]
     check_room(prepared, config.patches, FullModel().config.levels)
     began = last_validation = time.monotonic()
@@ -142,15 +146,17 @@ def train(
 class Trainer:
     """Model, running average and optimiser of one run."""
 
-    def __init__(self, config: TrainConfig, device: torch.device, run_dir: Path) -> None:
+    def __init__(
+        self, config: TrainConfig, device: torch.device, run_dir: Path, initial: FullModel | None = None
+    ) -> None:
         self._config = config
         self._device = device
         self._run_dir = run_dir
         self._model = FullModel()
-        if config.initial:
-            self._model.load_state_dict(load_weights(Path(config.initial)).model.state_dict())
-        else:
+        if initial is None:
             initialise_conditioned(self._model, config.seed)
+        else:
+            self._model.load_state_dict(initial.state_dict())
         condition(self._model)
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
