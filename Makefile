@@ -11,7 +11,7 @@ FRAMES ?= 24
 OUT := out
 
 # Debian's names of what a window needs, and of what the tests need besides.
-WINDOW_PACKAGES := libgl1 libegl1 libgl1-mesa-dri libglx-mesa0 libx11-6 libxext6 libxrandr2 libxinerama1 libxcursor1 libxi6 libxkbcommon0
+WINDOW_PACKAGES := libgl1 libegl1 libgl1-mesa-dri libglx-mesa0 libx11-6 libxext6 libxrandr2 libxinerama1 libxcursor1 libxi6 libxrender1 libxkbcommon0
 TEST_PACKAGES := xvfb xdotool
 
 .PHONY: run test lint clean window-packages test-packages

@@ -56,7 +56,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--patch", type=count, metavar="PX", default=60, help="side of a training patch (default: 60)")
     parser.add_argument("--batch", type=count, metavar="N", default=20, help="patches a step, a multiple of 4 (default: 20)")
     parser.add_argument("--lr", type=positive, metavar="R", default=1e-4, help="learning rate (default: 1e-4)")
-    parser.add_argument("--decay", type=share, metavar="F", default=0.3, help="last share of the steps, of a falling rate (0.3)")
+    parser.add_argument("--decay", type=share, metavar="F", default=0.3, help="last share of the steps, of a falling rate")
     parser.add_argument(
         "--balance", type=share, metavar="F", default=0.0, help="0: the paper's loss (default); to 1: dark patches weigh more"
     )
