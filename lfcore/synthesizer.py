@@ -6,6 +6,7 @@ and in the number type that is fastest on this machine; `MeanSynthesizer` is the
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -28,6 +29,9 @@ from lfcore.warp import backward_warp, source_offset
 
 # Features of one tile take (2 L) values a pixel: 200 x 288 px in bfloat16 are 23 MB.
 TILE = (200, 288)
+
+# How far beyond the edge the edge is continued, px: more than 21 px of disparity need at a viewpoint 0.25 outside.
+FARTHEST_SAMPLE = 64
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,8 @@ class NetworkSynthesizer:
                 clock.lap("disparity")
             _check(cancelled)
             warped = backward_warp(corners, disparity.expand(4, -1, -1, -1), offsets)  # (4, 3, H, W)
-            h_features = colour_features(disparity, warped.reshape(1, 12, height, width), torch.tensor([[u, v]]))
+            continued = _continued_at_edges(corners, disparity, offsets, warped)
+            h_features = colour_features(disparity, continued.reshape(1, 12, height, width), torch.tensor([[u, v]]))
             clock.lap("warp")
             for tile, source in tiles(height, width, self._tile):
                 _check(cancelled)
@@ -177,6 +182,30 @@ class NetworkSynthesizer:
             piece = F.pad(piece, padding, mode="reflect")
         result: Tensor = stack(piece.contiguous(memory_format=torch.channels_last))
         return result
+
+
+def _continued_at_edges(corners: Tensor, disparity: Tensor, offsets: Tensor, warped: Tensor) -> Tensor:
+    """The warped inputs (4, 3, H, W) with, in the outermost BORDER pixels, the edge of an input where it had no sample.
+
+    There the colour network would see the black of "outside" and leave a dark fringe. Its output 2 BORDER px from the edge
+    and further in does not depend on these pixels.
+    """
+    height, width = warped.shape[-2:]
+    reach = min(math.ceil(float(disparity.abs().max()) * float(offsets.abs().max())) + 3, FARTHEST_SAMPLE)
+    padded = F.pad(corners, (reach,) * 4, mode="replicate")
+    result = warped.clone()
+    for window in (
+        Window(0, BORDER, 0, width),
+        Window(height - BORDER, height, 0, width),
+        Window(0, height, 0, BORDER),
+        Window(0, height, width - BORDER, width),
+    ):
+        rows, columns = slice(window.top, window.bottom), slice(window.left, window.right)
+        # As much of the padded inputs as the window's samples can reach.
+        near = padded[..., window.top : window.bottom + 2 * reach, window.left : window.right + 2 * reach]
+        piece = disparity[..., rows, columns].expand(4, -1, -1, -1)
+        result[..., rows, columns] = backward_warp(near, piece, offsets, (reach, reach))
+    return result
 
 
 class MeanSynthesizer:

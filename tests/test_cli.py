@@ -293,7 +293,9 @@ def test_train_hands_its_options_to_the_loop(
         run_dir: Path,
         report: Callable[[loop.Progress], None],
         stopped: Callable[[], bool],
+        initial: object,
     ) -> None:
+        assert initial is None
         seen.update(config=config, runtime=runtime, out=out, run_dir=run_dir)
         assert [light_field.name for light_field in scenes] == ["a scene é"]
         assert validation == []

@@ -42,6 +42,23 @@ def test_the_inside_equals_the_reference_without_padding() -> None:
     np.testing.assert_allclose(found.image[bb, bb], image.permute(1, 2, 0).clamp(0, 1), atol=1e-4)
 
 
+def test_no_dark_fringe_where_the_warp_leaves_the_picture() -> None:
+    """On a plane whose disparity is known to the network, a colour network that averages must not darken towards the edge."""
+    model, field = small_model(), plane(8.0, size=SIZE)
+    with torch.no_grad():
+        model.disparity.last.weight.zero_()
+        model.disparity.last.bias.fill_(8.0)
+        model.colour.last.weight[:, 12:] = 0  # leave the averaging path alone
+    synthesizer = float32(model, (64, 64))
+    synthesizer.set_light_field(field)
+    found, truth = synthesizer.synthesize(0.5, 0.5), field.view(1, 1)
+    assert found.warped is not None and (found.warped[:, 0] == 0).any()  # the inputs themselves do leave the picture
+    edge = np.ones(SIZE, bool)
+    edge[6:-6, 6:-6] = False
+    assert np.abs(found.image - truth)[edge].mean() < 0.12
+    assert found.image[edge].mean() == pytest.approx(truth[edge].mean(), abs=0.03)
+
+
 @pytest.mark.parametrize("tile", [(35, 41), (20, 83), (64, 64)])
 def test_tiles_leave_no_seams(tile: tuple[int, int]) -> None:
     model, field = small_model(), plane(3.0, size=SIZE)
