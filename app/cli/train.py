@@ -63,6 +63,9 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument(
         "--matching", type=int, metavar="N", default=1000, help="first steps that also match planes (default: 1000)"
     )
+    parser.add_argument(
+        "--matching-weight", type=positive, metavar="W", default=0.03, help="how much that counts at first (default: 0.03)"
+    )
     parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
     parser.add_argument("--init", metavar="FILE", type=Path, help="weights to go on from, in place of random ones")
     parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
@@ -132,6 +135,7 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         learning_rate=options.lr,
         decay_share=options.decay,
         matching_steps=options.matching,
+        matching_weight=options.matching_weight,
         balance=options.balance,
         seed=options.seed,
         patches=patches,
