@@ -182,6 +182,14 @@ def test_the_curve_is_written_as_table_and_picture(tmp_path: Path) -> None:
     assert curve[0].mean == 22.0 and CurvePoint(1, 1, 1, 1, {}).mean == -math.inf
 
 
+def test_corner_views_alone_cannot_be_validated_on(tmp_path: Path) -> None:
+    scenes, corners = [plane(2.0, (3, 3), (120, 120))], [plane(1.0, (2, 2), (72, 72))]
+    out, run = tmp_path / "o.safetensors", tmp_path / "r"
+    with pytest.raises(InputError, match="only the four corner views"):
+        train(TrainConfig(steps=1, patches=SMALL), Runtime(device="cpu"), scenes, corners, out, run, print, lambda: False)
+    assert not run.exists()
+
+
 def test_scenes_too_small_for_the_patch_are_refused_in_words(tmp_path: Path) -> None:
     field = LightField(np.zeros((3, 3, 60, 60, 3), np.uint8), "tiny", "", "")
     with pytest.raises(InputError, match="tiny"):

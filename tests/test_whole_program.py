@@ -40,6 +40,8 @@ show(Path(sys.argv[1]), Engine(lambda: TruthSynthesizer(0.5), 2**26), "truth")
 @pytest.fixture(scope="module")
 def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
     if missing_tools():
+        if os.environ.get("CI"):
+            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
         pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
     with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
         yield made

@@ -23,7 +23,7 @@ from lfcore.allocator import keep_freed_memory
 from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
-from lfcore.metrics import k16
+from lfcore.metrics import k16, k16_view
 from lfcore.networks import BORDER, FullModel, colour_features
 from lfcore.planesweep import Window, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import NetworkSynthesizer, corner_offsets, corner_tensor, fastest_dtype
@@ -114,6 +114,8 @@ def train(
     configuration.
     """
     keep_freed_memory()
+    for light_field in validation:
+        k16_view(light_field)  # refuses corners alone now, not after the first minutes
     if initial is not None:
         config = replace(config, initial=initial.digest)
     trainer = Trainer(config, _device(runtime.device), run_dir, initial.model if initial else None)
@@ -255,7 +257,7 @@ class Trainer:
         synthesizer = NetworkSynthesizer(plain_copy(self._average), "validation")
         scores: dict[str, float] = {}
         for light_field in light_fields:
-            row, column = light_field.rows // 2, light_field.columns // 2
+            row, column = k16_view(light_field)
             synthesizer.set_light_field(light_field)
             synthesis = synthesizer.synthesize(*light_field.position(row, column))
             scores[light_field.name] = k16(synthesis.image, light_field.view(row, column)).psnr
