@@ -34,6 +34,10 @@ def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIE
         time.sleep(0.03)
 
 
+# Between reaching a place, pressing there and moving on: no hand does all three between two frames.
+_HAND_SECONDS = 0.15
+
+
 @dataclass(frozen=True)
 class VirtualScreen:
     """A running Xvfb."""
@@ -62,7 +66,9 @@ class VirtualScreen:
     def drag(self, start: tuple[int, int], delta: tuple[int, int]) -> None:
         """Move the mouse to `start`, press the left button and move by `delta`; the button stays down."""
         self.xdotool("mousemove", *start)
+        time.sleep(_HAND_SECONDS)
         self.xdotool("mousedown", 1)
+        time.sleep(_HAND_SECONDS)
         for part in (1, 2, 3):
             self.xdotool("mousemove", start[0] + delta[0] * part // 3, start[1] + delta[1] * part // 3)
 
