@@ -9,7 +9,6 @@ to the others (LFC) by their names. Neither their order nor their number means a
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
 import stat
@@ -22,7 +21,7 @@ from typing import Any, BinaryIO
 
 from lfcore.atomic import atomic_path
 from lfcore.errors import InputError
-from lfcore.formats.lytro.fields import Fields, check_json_size, parse_object
+from lfcore.formats.lytro.fields import Fields, check_json_size, parse_object, to_json
 
 MAGIC = b"\x89LFP\r\n\x1a\n"
 TABLE = b"LFM"
@@ -130,9 +129,8 @@ def write_container(path: str | os.PathLike[str], table: Mapping[str, Any], part
 
     The table names the parts by `reference_to(part)`. Atomic; OutputError where the target cannot be written.
     """
-    text = json.dumps(table, indent="\t", separators=(",", " : "), allow_nan=False).encode()
     sections = [(COMPONENT, part) for part in parts]
-    sections.insert(table_at, (TABLE, text))
+    sections.insert(table_at, (TABLE, to_json(table)))
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         file.write(_FILE_HEADER.pack(MAGIC, 1, 0))
         for kind, data in sections:

@@ -32,6 +32,11 @@ def parse_object(data: bytes, source: str) -> dict[str, Any]:
     return value
 
 
+def to_json(value: Mapping[str, Any]) -> bytes:
+    """JSON laid out as in the cameras' files: tabs, and blanks on both sides of colons."""
+    return json.dumps(value, indent="\t", separators=(",", " : "), allow_nan=False).encode()
+
+
 def check_json_size(length: int, source: str) -> None:
     """Raise InputError for more bytes than a camera's metadata takes; `source` begins the message."""
     if length > MAX_JSON_BYTES:
