@@ -95,6 +95,7 @@ class CaptureFacts:
     serial: str | None
     sensor_serial: str | None
     taken: str | None  # date and time as the file writes them
+    file_name: str | None  # the name that the camera gave the capture, without extension
     zoom_step: int | None
     focus_step: int | None
     focal_length: float | None
@@ -303,6 +304,7 @@ def _facts(generation: Generation, public: Fields, private: Fields, tags: Fields
         serial=private.child("camera").text("serialNumber") or camera.text("serialNumber"),
         sensor_serial=secret.text("serialNumber") or secret.text("sensorSerial"),
         taken=devices.child("clock").text("zuluTime"),
+        file_name=public.child("picture").text("dcfFile"),
         zoom_step=lens.whole("zoomStep", -100_000, 100_000),
         focus_step=lens.whole("focusStep", -100_000, 100_000),
         focal_length=lens.number("focalLength", 0, 10),
