@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor, nn
 
-from lfcore.planesweep import Levels
+from lfcore.planesweep import Levels, luminance
+from lfcore.tone import root_tone
 
 INPUTS = 4
 
@@ -18,6 +19,7 @@ class ModelConfig:
 
     name: str = "full"
     levels: Levels = field(default_factory=Levels)
+    tone: str = "root"  # in which the luminance is swept: "root" (lfcore.tone), or "stored" as in the authors' code
 
 
 class PaperStack(nn.Module):
@@ -60,21 +62,48 @@ class FullModel(nn.Module):
         self.colour = PaperStack(3 * INPUTS + 3, 3)
 
 
+def sweep_luminance(images: Tensor, config: ModelConfig) -> Tensor:
+    """(..., 3, H, W) stored values -> (..., H, W), what the plane sweep of this model runs over."""
+    luma = luminance(images)
+    return root_tone(luma) if config.tone == "root" else luma
+
+
+@dataclass(frozen=True)
+class SingleConfig:
+    """The ablation of the paper's Section 5: no disparity, one network."""
+
+    name: str = "single"
+
+
+class SingleModel(nn.Module):
+    """One stack from the four inputs, unwarped, and the position straight to the picture (paper, Fig. 10: blurred, ghosts)."""
+
+    def __init__(self, config: SingleConfig | None = None) -> None:
+        super().__init__()
+        self.config = config or SingleConfig()
+        self.colour = PaperStack(3 * INPUTS + 2, 3)
+
+
+def single_features(inputs: Tensor, positions: Tensor) -> Tensor:
+    """inputs: (B, 12, h, w); positions: (B, 2), (u, v). Returns (B, 14, h, w): the inputs, v - 0.5, u - 0.5."""
+    b, _, h, w = inputs.shape
+    uv = (positions - 0.5).flip(1).view(b, 2, 1, 1).expand(b, 2, h, w)
+    return torch.cat((inputs, uv), 1)
+
+
 def colour_features(disparity: Tensor, warped: Tensor, positions: Tensor) -> Tensor:
     """Input of the colour network: disparity, four warped inputs, v - 0.5, u - 0.5 (authors' code).
 
     disparity: (B, 1, h, w), px. warped: (B, 12, h, w), the inputs in the order of lightfield.CORNERS. positions: (B, 2),
     the novel views' (u, v). Returns (B, 15, h, w).
     """
-    b, _, h, w = disparity.shape
-    uv = (positions - 0.5).flip(1).view(b, 2, 1, 1).expand(b, 2, h, w)
-    return torch.cat((disparity, warped, uv), 1)
+    return torch.cat((disparity, single_features(warped, positions)), 1)
 
 
-def initialise(model: FullModel, seed: int) -> None:
-    """Xavier initialisation, as the paper; the colour network starts as the average of its four warped inputs.
+def initialise(model: FullModel | SingleModel, seed: int) -> None:
+    """Xavier initialisation, as the paper; the stack that puts out the picture starts as the average of its four inputs.
 
-    The averaging path is a start, not a constraint: twelve of the hidden channels carry the warped inputs (which are not
+    The averaging path is a start, not a constraint: twelve of the hidden channels carry the inputs (which are not
     negative, so that ReLU passes them), the last layer takes their mean, and all weights are trained from there.
     """
     generator = torch.Generator().manual_seed(seed)
@@ -83,17 +112,21 @@ def initialise(model: FullModel, seed: int) -> None:
             nn.init.xavier_uniform_(module.weight, generator=generator)
             assert module.bias is not None
             nn.init.zeros_(module.bias)
-    stack = model.colour
+    # In the features of the full model's colour network the disparity stands before the inputs.
+    _start_as_average(model.colour, first_input=1 if isinstance(model, FullModel) else 0)
+
+
+def _start_as_average(stack: PaperStack, first_input: int) -> None:
     with torch.no_grad():
         layers = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
         # Disparities are some ten times as large as colours: without this their random weights drown the average.
-        layers[0].weight[:, 0] *= 0.1
+        layers[0].weight[:, :first_input] *= 0.1
         for layer in layers:
             centre = layer.kernel_size[0] // 2
             layer.weight[: 3 * INPUTS] = 0
+            shift = first_input if layer is layers[0] else 0
             for channel in range(3 * INPUTS):
-                # In the features of the first layer the disparity stands before the warped inputs.
-                layer.weight[channel, channel + (layer is layers[0]), centre, centre] = 1
+                layer.weight[channel, channel + shift, centre, centre] = 1
         stack.last.weight *= 0.1
         for colour in range(3):
             stack.last.weight[colour, : 3 * INPUTS] = 0

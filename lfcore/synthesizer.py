@@ -1,7 +1,7 @@
 """Synthesis of novel views: expensive once per light field, cheap many times.
 
 `reference_synthesis` is the paper in float32, written to be read next to it. `NetworkSynthesizer` computes the same in tiles
-and in the number type that is fastest on this machine; `MeanSynthesizer` is the plain average that both are measured against.
+and in the number type that is fastest on this machine; `MeanSynthesizer` is the plain average that all are measured against.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from torch import Tensor
 from lfcore.allocator import keep_freed_memory
 from lfcore.errors import Cancelled, InputError
 from lfcore.lightfield import CORNERS, FloatArray, LightField, check_viewpoint
-from lfcore.networks import BORDER, FullModel, PaperStack, colour_features
-from lfcore.planesweep import Window, luminance, plane_sweep
+from lfcore.models import Model
+from lfcore.networks import BORDER, FullModel, PaperStack, SingleModel, colour_features, sweep_luminance
+from lfcore.planesweep import Window, plane_sweep
 from lfcore.warp import backward_warp, source_offset
 
 # Features of one tile take (2 L) values a pixel: 200 x 288 px in bfloat16 are 23 MB.
@@ -47,7 +48,8 @@ class Synthesis:
     timings: Mapping[str, float]  # seconds by stage: features, disparity, warp, colour, total
 
 
-def _never() -> bool:
+def never() -> bool:
+    """Is not cancelled."""
     return False
 
 
@@ -65,7 +67,7 @@ class Synthesizer(Protocol):
     def set_light_field(self, light_field: LightField) -> None:
         """Take over the corner views; what does not depend on (u, v) is computed here."""
 
-    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = _never) -> Synthesis:
+    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         """The view at (u, v). Raises InputError outside the allowed range, Cancelled once `cancelled()` holds."""
 
 
@@ -90,7 +92,8 @@ def reference_synthesis(model: FullModel, corners: Tensor, u: float, v: float) -
     whole = Window(0, height, 0, width)
     with torch.no_grad():
         # Eqs. 4 and 5: the features K.
-        features = plane_sweep(luminance(corners).unsqueeze(1), offsets, model.config.levels, whole)  # (1, 2 L, H, W)
+        luma = sweep_luminance(corners, model.config).unsqueeze(1)  # (4, 1, H, W)
+        features = plane_sweep(luma, offsets, model.config.levels, whole)  # (1, 2 L, H, W)
         # Eq. 2: D_q = g_d(K).
         disparity = model.disparity(features)  # (1, 1, H - 12, W - 12)
         # Eq. 3: the inputs, warped by D_q.
@@ -134,54 +137,55 @@ class NetworkSynthesizer:
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer."""
         self._corners = corner_tensor(light_field)
-        self._luma = luminance(self._corners).unsqueeze(1)
+        self._luma = sweep_luminance(self._corners, self._model.config).unsqueeze(1)
 
-    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = _never) -> Synthesis:
+    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._corners is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
         corners, luma = self._corners, self._luma
         _, _, height, width = corners.shape
         offsets = corner_offsets(u, v)
-        clock = _Clock()
+        clock = Clock()
         disparity = torch.empty(1, 1, height, width)
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
             for tile, source in tiles(height, width, self._tile):
-                _check(cancelled)
+                check_cancelled(cancelled)
                 h, w = source.shape
                 features = torch.empty(1, 2 * self._model.config.levels.count, h, w, dtype=self._dtype)
                 plane_sweep(luma, offsets, self._model.config.levels, source, features)
                 clock.lap("features")
-                _check(cancelled)
-                _put(disparity, tile, self._apply(self._model.disparity, features, tile, source))
+                check_cancelled(cancelled)
+                put(disparity, tile, apply_stack(self._model.disparity, features, tile, source))
                 clock.lap("disparity")
-            _check(cancelled)
+            check_cancelled(cancelled)
             warped = backward_warp(corners, disparity.expand(4, -1, -1, -1), offsets)  # (4, 3, H, W)
             continued = _continued_at_edges(corners, disparity, offsets, warped)
             h_features = colour_features(disparity, continued.reshape(1, 12, height, width), torch.tensor([[u, v]]))
             clock.lap("warp")
             for tile, source in tiles(height, width, self._tile):
-                _check(cancelled)
+                check_cancelled(cancelled)
                 piece = h_features[:, :, source.top : source.bottom, source.left : source.right].to(self._dtype)
-                _put(image, tile, self._apply(self._model.colour, piece, tile, source))
+                put(image, tile, apply_stack(self._model.colour, piece, tile, source))
             clock.lap("colour")
         return Synthesis(
-            u, v, self.name, _picture(image[0].clamp_(0, 1)), disparity[0, 0].numpy(), _picture(warped), clock.timings()
+            u, v, self.name, picture(image[0].clamp_(0, 1)), disparity[0, 0].numpy(), picture(warped), clock.timings()
         )
 
-    def _apply(self, stack: PaperStack, piece: Tensor, tile: Window, source: Window) -> Tensor:
-        """A stack's output over `tile`, from its input over `source`, mirrored where the picture ends."""
-        padding = (
-            BORDER - (tile.left - source.left),
-            BORDER - (source.right - tile.right),
-            BORDER - (tile.top - source.top),
-            BORDER - (source.bottom - tile.bottom),
-        )
-        if any(padding):
-            piece = F.pad(piece, padding, mode="reflect")
-        result: Tensor = stack(piece.contiguous(memory_format=torch.channels_last))
-        return result
+
+def apply_stack(stack: PaperStack, piece: Tensor, tile: Window, source: Window) -> Tensor:
+    """A stack's output over `tile`, from its input over `source`, mirrored where the picture ends."""
+    padding = (
+        BORDER - (tile.left - source.left),
+        BORDER - (source.right - tile.right),
+        BORDER - (tile.top - source.top),
+        BORDER - (source.bottom - tile.bottom),
+    )
+    if any(padding):
+        piece = F.pad(piece, padding, mode="reflect")
+    result: Tensor = stack(piece.contiguous(memory_format=torch.channels_last))
+    return result
 
 
 def _continued_at_edges(corners: Tensor, disparity: Tensor, offsets: Tensor, warped: Tensor) -> Tensor:
@@ -220,11 +224,11 @@ class MeanSynthesizer:
     def set_light_field(self, light_field: LightField) -> None:
         self._corners = light_field.corners()
 
-    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = _never) -> Synthesis:
+    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._corners is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        _check(cancelled)
+        check_cancelled(cancelled)
         start = time.perf_counter()
         image = self._corners.mean(0)
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
@@ -252,7 +256,19 @@ def make_synthesizer(model: str | Path = "full") -> Synthesizer:
             f"Unknown model {str(model)!r}: choose one of {', '.join(MODEL_NAMES)}, or the path of a .safetensors file."
         )
     weights = load_weights(path)
-    return NetworkSynthesizer(weights.model, weights.digest)
+    return synthesizer_of(weights.model, weights.digest)
+
+
+def synthesizer_of(model: Model, key: str) -> Synthesizer:
+    """The synthesizer that runs a model; `key` names its weights in caches."""
+    from lfcore.compact_synthesizer import CompactSynthesizer
+    from lfcore.single_synthesizer import SingleSynthesizer
+
+    if isinstance(model, FullModel):
+        return NetworkSynthesizer(model, key)
+    if isinstance(model, SingleModel):
+        return SingleSynthesizer(model, key)
+    return CompactSynthesizer(model, key)
 
 
 def tiles(height: int, width: int, tile: tuple[int, int]) -> Iterator[tuple[Window, Window]]:
@@ -302,7 +318,7 @@ def _convolution_timer(dtype: torch.dtype) -> Callable[[], float]:
     return timer
 
 
-class _Clock:
+class Clock:
     """Adds up the seconds between laps by stage."""
 
     def __init__(self) -> None:
@@ -318,15 +334,17 @@ class _Clock:
         return {**self._seconds, "total": time.perf_counter() - self._start}
 
 
-def _check(cancelled: Callable[[], bool]) -> None:
+def check_cancelled(cancelled: Callable[[], bool]) -> None:
+    """Raise Cancelled once `cancelled()` holds."""
     if cancelled():
         raise Cancelled
 
 
-def _put(target: Tensor, tile: Window, values: Tensor) -> None:
+def put(target: Tensor, tile: Window, values: Tensor) -> None:
+    """Write the values of a tile (N, C, h, w) into a picture (N, C, H, W)."""
     target[:, :, tile.top : tile.bottom, tile.left : tile.right] = values
 
 
-def _picture(channels_first: Tensor) -> FloatArray:
+def picture(channels_first: Tensor) -> FloatArray:
     """(..., 3, H, W) tensor -> (..., H, W, 3) array: the one crossing from torch to numpy."""
     return np.ascontiguousarray(channels_first.movedim(-3, -1).numpy())

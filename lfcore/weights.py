@@ -16,8 +16,7 @@ from torch import Tensor
 
 from lfcore.atomic import atomic_path
 from lfcore.errors import WeightsError
-from lfcore.networks import FullModel, ModelConfig
-from lfcore.planesweep import Levels
+from lfcore.models import Config, Model, build_model, config_from_json
 
 FORMAT = "lfview weights 1"
 # The paper's pair of networks takes 6.6 MB in float32; anything far beyond is no weight file of ours.
@@ -28,18 +27,18 @@ LARGEST_FILE = 256 * 2**20
 class Weights:
     """A model with its weights, the digest that names them in caches, and what the file tells of their training."""
 
-    model: FullModel
+    model: Model
     digest: str
     training: Mapping[str, Any]
 
 
-def save_weights(path: Path, model: FullModel, training: Mapping[str, Any]) -> None:
+def save_weights(path: Path, model: Model, training: Mapping[str, Any]) -> None:
     """Write the weights of `model` in float32, atomically. `training` (JSON values) says how they came about."""
     tensors = {name: value.detach().float().cpu().contiguous() for name, value in model.state_dict().items()}
     metadata = {
         "format": FORMAT,
         "config": json.dumps(asdict(model.config)),
-        "digest": _digest(model.config, tensors),
+        "digest": _digest(asdict(model.config), tensors),
         "training": json.dumps(training),
     }
     data = save(tensors, metadata)
@@ -62,12 +61,12 @@ def load_weights(path: Path) -> Weights:
     if metadata.get("format") != FORMAT:
         raise WeightsError(f"{path} holds no weights of lfview (format {metadata.get('format')!r}, expected {FORMAT!r}).")
     config = _config(path, metadata)
-    model = FullModel(config)
+    model = build_model(config)
     expected = {name: tuple(value.shape) for name, value in model.state_dict().items()}
     found = {name: tuple(value.shape) for name, value in tensors.items()}
     if expected != found:
         raise WeightsError(f"{path} holds weights of another model than its config says; train or get it anew.")
-    digest = _digest(config, tensors)
+    digest = _digest(_json(path, metadata, "config"), tensors)
     if digest != metadata.get("digest"):
         raise WeightsError(f"{path} is damaged: its weights do not match their digest; get a fresh copy.")
     if not all(bool(torch.isfinite(value).all()) for value in tensors.values()):
@@ -76,17 +75,11 @@ def load_weights(path: Path) -> Weights:
     return Weights(model, digest, _json(path, metadata, "training"))
 
 
-def _config(path: Path, metadata: Mapping[str, str]) -> ModelConfig:
-    values = _json(path, metadata, "config")
+def _config(path: Path, metadata: Mapping[str, str]) -> Config:
     try:
-        levels = Levels(**values["levels"])
-        config = ModelConfig(name=str(values["name"]), levels=levels)
-        sane = 2 <= levels.count <= 1000 and -1000 < levels.low < levels.high < 1000
-    except (KeyError, TypeError) as error:
-        raise WeightsError(f"{path} describes its model in a way that this program does not know.") from error
-    if config.name != "full" or not sane:
-        raise WeightsError(f"{path} holds weights of a model named {config.name!r}, which this program does not have.")
-    return config
+        return config_from_json(_json(path, metadata, "config"))
+    except ValueError as error:
+        raise WeightsError(f"{path} holds weights of {error}, which this program does not have.") from error
 
 
 def _json(path: Path, metadata: Mapping[str, str], key: str) -> dict[str, Any]:
@@ -99,8 +92,8 @@ def _json(path: Path, metadata: Mapping[str, str], key: str) -> dict[str, Any]:
     return value
 
 
-def _digest(config: ModelConfig, tensors: Mapping[str, Tensor]) -> str:
-    digest = hashlib.blake2b(json.dumps(asdict(config), sort_keys=True).encode(), digest_size=16)
+def _digest(config: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> str:
+    digest = hashlib.blake2b(json.dumps(config, sort_keys=True).encode(), digest_size=16)
     for name in sorted(tensors):
         digest.update(name.encode())
         digest.update(tensors[name].contiguous().numpy().tobytes())

@@ -10,11 +10,13 @@ from scenes import plane
 from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
+from lfcore.models import TRAINABLE
 from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, learning_rate, prepare_scene, train
-from lfcore.training.patches import PatchConfig, TrainingScene, margin, sample_group
+from lfcore.training.loss import LossConfig
+from lfcore.training.patches import PatchConfig, TrainingScene, margin, mixed, sample_group
 from lfcore.training.plot import plot
 from lfcore.warp import backward_warp
 from lfcore.weights import load_weights
@@ -82,12 +84,28 @@ def test_a_group_depends_on_the_state_of_its_generator_alone() -> None:
     assert a.inputs.shape != c.inputs.shape or not np.array_equal(a.inputs, c.inputs)
 
 
+def test_generated_scenes_are_drawn_as_often_as_asked() -> None:
+    """Scenes of two brightnesses tell where a patch comes from."""
+    captured, generated = (
+        [TrainingScene(LightField(np.full((3, 3, 120, 120, 3), value, np.uint8), "", "", ""), 0, 0) for _ in range(count)]
+        for value, count in ((10, 2), (200, 7))
+    )
+    scenes = mixed(captured, generated, 0.3)
+    drawn = [sample_group(scenes, SMALL, LEVELS, np.random.default_rng((3, k))).target.mean((1, 2, 3)) for k in range(200)]
+    assert np.mean(np.concatenate(drawn) > 0.5) == pytest.approx(0.3, abs=0.07)  # 400 patches: 3 standard deviations
+    assert {scene.weight for scene in mixed(captured, [], 0.3)} == {0.5}
+    assert {scene.weight for scene in mixed([], generated, 0.3)} == {1 / 7}
+
+
 def test_the_margin_holds_every_sample_of_the_sweep() -> None:
     assert margin(LEVELS) >= 21 + 2
+    assert margin(LEVELS) % 2 == 0  # half-resolution models begin at whole pixels of theirs
 
 
-def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None) -> list[Progress]:
-    config = TrainConfig(steps=steps, decay_share=0, matching_steps=3, patches=SMALL)
+def train_small(
+    tmp_path: Path, steps: int, run: str, stop_at: int | None = None, model: str = "full"
+) -> list[Progress]:
+    config = TrainConfig(model=model, steps=steps, decay_share=0, loss=LossConfig(matching_steps=3), patches=SMALL)
     reports: list[Progress] = []
     train(
         config,
@@ -102,10 +120,11 @@ def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None
     return reports
 
 
-def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path) -> None:
-    train_small(tmp_path, 5, "straight")
-    first = train_small(tmp_path, 5, "halved", stop_at=2)
-    second = train_small(tmp_path, 5, "halved")
+@pytest.mark.parametrize("model", TRAINABLE)
+def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path, model: str) -> None:
+    train_small(tmp_path, 5, "straight", model=model)
+    first = train_small(tmp_path, 5, "halved", stop_at=2, model=model)
+    second = train_small(tmp_path, 5, "halved", model=model)
     assert [p.step for p in first] == [1, 2]
     assert [p.step for p in second] == [3, 4, 5]
     straight = load_weights(tmp_path / "straight.safetensors").model.state_dict()
@@ -119,7 +138,7 @@ def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path) -> None:
 def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None:
     train_small(tmp_path, 1, "first")
     given = load_weights(tmp_path / "first.safetensors")
-    config = TrainConfig(steps=1, learning_rate=1e-9, warm_up_steps=0, matching_steps=0, patches=SMALL)
+    config = TrainConfig(steps=1, learning_rate=1e-9, warm_up_steps=0, loss=LossConfig(matching_steps=0), patches=SMALL)
     out, run = tmp_path / "second.safetensors", tmp_path / "second"
     scenes = [plane(2.0, (3, 3), (120, 120))]
     train(config, Runtime(device="cpu"), scenes, [], out, run, lambda p: None, lambda: False, given)
@@ -137,7 +156,7 @@ def load_checkpoint_tensors(run: Path) -> dict[str, torch.Tensor]:
 
 def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_path: Path) -> None:
     train_small(tmp_path, 1, "run")
-    config = TrainConfig(steps=2, decay_share=0, matching_steps=3, patches=SMALL, learning_rate=5e-3)
+    config = TrainConfig(steps=2, decay_share=0, loss=LossConfig(matching_steps=3), patches=SMALL, learning_rate=5e-3)
     scenes = [plane(2.0, (3, 3), (120, 120))]
     arguments = (scenes, [], tmp_path / "o.safetensors", tmp_path / "run", lambda p: None, lambda: False)
     with pytest.raises(InputError, match="learning_rate"):
@@ -148,8 +167,11 @@ def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_p
         train(config, Runtime(device="cpu"), *arguments)
 
 
-def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path) -> None:
-    config = TrainConfig(learning_rate=3e-4, warm_up_steps=1, matching_steps=0, patches=SMALL)
+@pytest.mark.parametrize("model", ["full", "realtime"])
+def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path, model: str) -> None:
+    config = TrainConfig(
+        model=model, learning_rate=3e-4, warm_up_steps=1, loss=LossConfig(matching_steps=0), patches=SMALL
+    )
     trainer = Trainer(config, torch.device("cpu"), tmp_path)
     groups = trainer.draw([scene(5.0)], 0)
     errors = [trainer.take_step(groups) for _ in range(30)]

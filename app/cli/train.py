@@ -33,7 +33,12 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "train the networks; the same command goes on where it was stopped",
         "lfview train --data training/* --val held_out/* --out weights.safetensors --minutes 60",
     )
-    parser.add_argument("--model", choices=["full"], default="full", help="what to train (default: full, the paper's networks)")
+    parser.add_argument(
+        "--model",
+        choices=["full", "realtime", "single"],
+        default="full",
+        help="what to train: the paper's networks (full, the default), the small pair, or the paper's one-network ablation",
+    )
     parser.add_argument(
         "--data",
         metavar="DIR",
@@ -92,6 +97,7 @@ def run(options: argparse.Namespace) -> int:
 
     from lfcore.export import make_folder
     from lfcore.training.loop import Runtime, train
+    from lfcore.training.team import join_team
     from lfcore.weights import load_weights
 
     config = _config(options)
@@ -102,7 +108,7 @@ def run(options: argparse.Namespace) -> int:
     initial = load_weights(options.init) if options.init else None
     scenes, validation = _open_all(data), _open_all(held_out)
     reporter = _Reporter()
-    with _stop_on_signal() as stop:
+    with _stop_on_signal() as stop, join_team(options.device) as team:
         train(
             config,
             Runtime(device=options.device, stop_after_minutes=options.minutes),
@@ -113,7 +119,10 @@ def run(options: argparse.Namespace) -> int:
             reporter,
             stop,
             initial,
+            team,
         )
+    if not team.leads:
+        return 0
     reporter.finish()
     if stop.number is not None:
         print(f"Stopped; the same command goes on from {run_dir}.", file=sys.stderr)
@@ -124,6 +133,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _config(options: argparse.Namespace) -> TrainConfig:
     from lfcore.training.loop import TrainConfig
+    from lfcore.training.loss import LossConfig
     from lfcore.training.patches import PatchConfig
 
     try:
@@ -134,9 +144,7 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         steps=options.steps,
         learning_rate=options.lr,
         decay_share=options.decay,
-        matching_steps=options.matching,
-        matching_weight=options.matching_weight,
-        balance=options.balance,
+        loss=LossConfig(options.matching, options.matching_weight, options.balance),
         seed=options.seed,
         patches=patches,
         model=options.model,

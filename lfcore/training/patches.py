@@ -8,7 +8,7 @@ m whole pixels per view: exact, and it adds the same number of pixels to every d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -43,6 +43,7 @@ class TrainingScene:
     light_field: LightField
     low: float
     high: float
+    weight: float = 1.0  # how often it is drawn, compared with others
 
     @property
     def spacing(self) -> int:
@@ -62,8 +63,9 @@ class PatchGroup:
 
 
 def margin(levels: Levels) -> int:
-    """How far beyond the patch a warp inside the corners can reach: the largest level and two taps."""
-    return int(np.ceil(levels.reach)) + 2
+    """How far beyond the patch a warp inside the corners can reach: the largest level and two taps. Even, so that patches
+    begin at a whole pixel of half the resolution too."""
+    return 2 * int(np.ceil((levels.reach + 2) / 2))
 
 
 def check_room(scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels) -> None:
@@ -78,11 +80,22 @@ def check_room(scenes: Sequence[TrainingScene], config: PatchConfig, levels: Lev
             )
 
 
+def mixed(
+    captured: Sequence[TrainingScene], generated: Sequence[TrainingScene], generated_share: float
+) -> list[TrainingScene]:
+    """All scenes, weighted so that generated ones make `generated_share` of what is drawn (all, or none, if there is but one
+    kind)."""
+    share = generated_share if captured else 1.0
+    share = share if generated else 0.0
+    parts = ((captured, 1 - share), (generated, share))
+    return [replace(scene, weight=part / len(scenes)) for scenes, part in parts for scene in scenes if part > 0]
+
+
 def sample_group(
     scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels, rng: np.random.Generator
 ) -> PatchGroup:
     """Draw one group. The same `rng` state gives the same group."""
-    u, v = _draw_viewpoint(scenes[int(rng.integers(len(scenes)))], rng)
+    u, v = _draw_viewpoint(_draw_scene(scenes, rng), rng)
     eligible = [scene for scene in scenes if _spacings(scene, u, v)]
     reach = margin(levels)
     before_y, before_x, after_y, after_x = _draw_margins(reach, config.edge_share, rng)
@@ -90,10 +103,15 @@ def sample_group(
     window = Window(before_y, before_y + config.size, before_x, before_x + config.size)
     patches = []
     for _ in range(config.group):
-        scene = eligible[int(rng.integers(len(eligible)))]
+        scene = _draw_scene(eligible, rng)
         patches.append(_draw_tone(_draw_views(scene, u, v, shape, levels, config, rng), config.tone_share, rng))
     stack = np.stack(patches, 1)  # (5, B, H, W, 3): TL, BL, TR, BR, novel
     return _draw_symmetry(stack, window, float(u), float(v), rng)
+
+
+def _draw_scene(scenes: Sequence[TrainingScene], rng: np.random.Generator) -> TrainingScene:
+    weights = np.array([scene.weight for scene in scenes])
+    return scenes[int(rng.choice(len(scenes), p=weights / weights.sum()))]
 
 
 def _draw_viewpoint(scene: TrainingScene, rng: np.random.Generator) -> tuple[Fraction, Fraction]:

@@ -1,0 +1,166 @@
+"""A small pair of networks of the paper's design, for real time: disparity from a plane sweep, then colour. No I/O here.
+
+What differs from the paper: the sweep runs at half resolution over fewer levels; the disparity network looks far (a stride and
+dilated layers), names a probability for every level, starts from the sweep's own minimum, and brings its result to full
+resolution by learned weights; the colour network works on 2 x 2 blocks of pixels, weighs the four warped inputs and adds what
+is missing. Both see pictures in the root tone (lfcore.tone), which evens out exposure and noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from lfcore.networks import INPUTS
+from lfcore.planesweep import Levels
+from lfcore.tone import stored_from_root
+
+ALIGNMENT = 4  # height and width must be whole numbers of so many pixels: half resolution, and a stride of 2 from there
+
+
+@dataclass(frozen=True)
+class CompactConfig:
+    """What a weight file must match."""
+
+    name: str = "realtime"
+    levels: Levels = field(default_factory=lambda: Levels(48))
+    width: int = 64  # channels of the disparity network at a quarter of the resolution
+    dilations: tuple[int, ...] = (1, 2, 4, 8, 1)  # of its residual blocks
+    fine_width: int = 48  # its channels at half resolution
+    colour_width: int = 48
+    colour_blocks: int = 2
+
+
+class CompactModel(nn.Module):
+    """Disparity and colour network; see the module's text."""
+
+    def __init__(self, config: CompactConfig | None = None) -> None:
+        super().__init__()
+        self.config = config or CompactConfig()
+        self.disparity = CompactDisparity(self.config)
+        self.colour = CompactColour(self.config)
+
+
+class ResidualBlock(nn.Module):
+    """x + conv(relu(conv(relu(x)))), 3x3, size unchanged."""
+
+    def __init__(self, channels: int, dilation: int = 1) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation)
+        self.second = nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation)
+
+    def forward(self, x: Tensor) -> Tensor:
+        result: Tensor = x + self.second(F.relu(self.first(F.relu(x))))
+        return result
+
+
+class CompactDisparity(nn.Module):
+    """Features of the half-resolution sweep to disparity at full resolution.
+
+    (B, 2 L, h, w) means and deviations, h and w even -> (B, 1, 2 h, 2 w), px of full resolution over the full baseline.
+    """
+
+    values: Tensor
+
+    def __init__(self, config: CompactConfig) -> None:
+        super().__init__()
+        count, width, fine = config.levels.count, config.width, config.fine_width
+        self.stem = nn.Conv2d(2 * count, width, 3, stride=2, padding=1)
+        self.blocks = nn.Sequential(*(ResidualBlock(width, dilation) for dilation in config.dilations))
+        self.rise = nn.Conv2d(width, 4 * fine, 1)
+        self.skip = nn.Conv2d(2 * count, fine, 3, padding=1)
+        self.join = nn.Conv2d(fine, fine, 3, padding=1)
+        self.score = nn.Conv2d(fine, count, 1)  # of each level
+        self.spread = nn.Conv2d(fine, 4 * 9, 1)  # weights of nine neighbours for each of four pixels
+        self.sharpness = nn.Parameter(torch.tensor(30.0))  # how steeply a level's score falls with its deviation
+        self.register_buffer("values", config.levels.values(), persistent=False)
+
+    def forward(self, features: Tensor) -> Tensor:
+        count = self.values.numel()
+        scaled = torch.cat((4 * features[:, :count] - 2, 10 * features[:, count:]), 1)
+        coarse = F.relu(self.rise(F.relu(self.blocks(self.stem(scaled)))))
+        h = F.relu(F.pixel_shuffle(coarse, 2) + self.skip(scaled))
+        h = F.relu(h + self.join(h))
+        with torch.autocast(features.device.type, enabled=False):  # in bfloat16 the mean over levels would be rounded
+            h = h.float()
+            # The start is the paper's classical forebear: the level at which the inputs agree best in a small window.
+            agreement = F.avg_pool2d(features[:, count:].float(), 5, 1, 2, count_include_pad=False)
+            logits = self.score(h) - self.sharpness * agreement
+            coarse_disparity = (logits.softmax(1) * self.values.view(1, -1, 1, 1)).sum(1, keepdim=True)
+            return spread_out(coarse_disparity, self.spread(h))
+
+
+def spread_out(coarse: Tensor, logits: Tensor) -> Tensor:
+    """Twice the resolution: each of the four new pixels of a pixel is a weighted mean of that pixel and its eight neighbours.
+
+    coarse: (B, 1, h, w); logits: (B, 36, h, w), softmax over each nine gives the weights. Returns (B, 1, 2 h, 2 w).
+    """
+    b, _, h, w = coarse.shape
+    padded = F.pad(coarse, (1, 1, 1, 1), mode="replicate")
+    near = torch.cat([padded[:, :, y : y + h, x : x + w] for y in range(3) for x in range(3)], 1)  # (B, 9, h, w)
+    weights = logits.view(b, 4, 9, h, w).softmax(2)
+    return F.pixel_shuffle((weights * near.unsqueeze(1)).sum(2), 2)
+
+
+class CompactColour(nn.Module):
+    """Four warped inputs to the picture: a weight for each, and a residual.
+
+    warped: (B, 12, h, w) in the root tone, h and w even; disparity: (B, 1, h, w), px; positions: (B, 2), (u, v). Returns
+    (B, 3, h, w), stored values.
+    """
+
+    def __init__(self, config: CompactConfig) -> None:
+        super().__init__()
+        width = config.colour_width
+        self.stem = nn.Conv2d(4 * (3 + 3 * INPUTS) + 4, width, 3, padding=1)
+        self.blocks = nn.Sequential(*(ResidualBlock(width) for _ in range(config.colour_blocks)))
+        self.weights = nn.Conv2d(width, 4 * INPUTS, 3, padding=1)
+        self.residual = nn.Conv2d(width, 4 * 3, 3, padding=1)
+        self.nearness = nn.Parameter(torch.tensor(0.3))  # how much a near input counts before the network has a say
+
+    def forward(self, warped: Tensor, disparity: Tensor, positions: Tensor) -> Tensor:
+        b, _, h, w = warped.shape
+        inputs = warped.view(b, INPUTS, 3, h, w)
+        mean = inputs.mean(1)  # (B, 3, h, w)
+        differences = (inputs - mean.unsqueeze(1)).view(b, 3 * INPUTS, h, w)
+        colours = F.pixel_unshuffle(torch.cat((4 * mean - 2, 10 * differences), 1), 2)  # (B, 60, h/2, w/2)
+        flat = positions.view(b, 2, 1, 1).expand(b, 2, h // 2, w // 2) * 2 - 1
+        slope = F.avg_pool2d(disparity, 2) / 5
+        range_ = F.max_pool2d(disparity, 6, 2, 2) + F.max_pool2d(-disparity, 6, 2, 2)  # how near an edge of depth is
+        x = torch.cat((colours, flat, slope, range_ / 5), 1)
+        hidden = F.relu(self.blocks(self.stem(x)))
+        logits, residual = self.weights(hidden), self.residual(hidden)
+        with torch.autocast(warped.device.type, enabled=False):
+            logits = F.pixel_shuffle(logits.float(), 2) + self.nearness * log_nearness(positions)  # (B, 4, h, w)
+            weights = logits.softmax(1).unsqueeze(2)
+            return stored_from_root((weights * inputs).sum(1) + 0.1 * F.pixel_shuffle(residual.float(), 2))
+
+
+def log_nearness(positions: Tensor) -> Tensor:
+    """Logarithm of the bilinear weight of each input at (u, v), kept finite: (B, 2) -> (B, 4, 1, 1), CORNERS order."""
+    u, v = positions.clamp(0, 1).unbind(1)
+    weights = torch.stack(((1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v), 1)
+    return (weights + 0.02).log().view(-1, INPUTS, 1, 1)
+
+
+def initialise_compact(model: CompactModel, seed: int) -> None:
+    """He initialisation; what is added to a path that already works starts small."""
+    generator = torch.Generator().manual_seed(seed)
+    for module in model.modules():
+        if isinstance(module, nn.Conv2d):
+            nn.init.kaiming_normal_(module.weight, nonlinearity="relu", generator=generator)
+            assert module.bias is not None
+            nn.init.zeros_(module.bias)
+    with torch.no_grad():
+        for module in model.modules():
+            if isinstance(module, ResidualBlock):
+                module.second.weight *= 0.3
+        for layer in (model.disparity.score, model.disparity.spread, model.colour.weights, model.colour.residual):
+            layer.weight *= 0.1
+        # Full resolution starts as the coarse pixel itself, mostly.
+        bias = model.disparity.spread.bias
+        assert bias is not None
+        bias.view(4, 9)[:, 4] = 2.0

@@ -1,0 +1,75 @@
+"""The loss of one step, for any model: squared error of the picture, and for a while the distance from the best match."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from lfcore.models import Model
+from lfcore.networks import BORDER
+from lfcore.planesweep import Levels, luminance, matching_disparity
+from lfcore.tone import root_tone
+from lfcore.training.architectures import Architecture, Batch, Prediction
+
+
+@dataclass(frozen=True)
+class LossConfig:
+    """Weights of the parts."""
+
+    matching_steps: int = 1000  # in which the disparity is also drawn to the plane sweep's best match (see matching_disparity)
+    matching_weight: float = 0.03
+    balance: float = 0.0  # a patch's squared error is divided by (its variance + 0.005) ** balance; 0 is the paper's loss
+
+
+class StepLoss(nn.Module):
+    """A module around the model, so that PyTorch's DistributedDataParallel sees one forward pass from patches to loss."""
+
+    def __init__(self, model: Model, architecture: Architecture, config: LossConfig, bfloat16: bool) -> None:
+        super().__init__()
+        self.model = model
+        self._architecture = architecture
+        self._config = config
+        self._bfloat16 = bfloat16
+
+    def forward(self, batch: Batch, step: int) -> tuple[Tensor, Tensor]:
+        """(mean squared error over RGB, loss), both scalars."""
+        prediction = self._architecture.predict(self.model, batch, self._autocast)
+        inside = slice(prediction.border, -prediction.border)
+        inner = batch.targets[:, :, inside, inside]
+        errors = (prediction.image - inner).square().mean((1, 2, 3))  # (B,)
+        # Dark and flat patches have small errors; balanced, they teach as much as bright ones.
+        loss = (errors / (inner.var((1, 2, 3)) + 0.005) ** self._config.balance).mean()
+        fading = 1 - step / max(self._config.matching_steps, 1)
+        if fading > 0 and prediction.disparity is not None:
+            loss = loss + self._config.matching_weight * fading * _matching_loss(batch, prediction)
+        return errors.detach().mean(), loss
+
+    def _autocast(self) -> torch.autocast:
+        device = next(self.model.parameters()).device
+        return torch.autocast(device.type, dtype=torch.bfloat16, enabled=self._bfloat16)
+
+
+def _matching_loss(batch: Batch, prediction: Prediction) -> Tensor:
+    """Distance of the disparity from the level at which the inputs match the novel view best, where that is clear."""
+    assert prediction.disparity is not None
+    border = prediction.disparity_border
+    targets, disparities = batch.targets.split(batch.sizes), prediction.disparity.split(batch.sizes)
+    for images, offsets, group, target, disparity in zip(
+        batch.inputs, batch.offsets, batch.groups, targets, disparities, strict=True
+    ):
+        w, (height, width) = group.window, images.shape[-2:]
+        if min(w.top, w.left, height - w.bottom, width - w.right) < BORDER:
+            continue  # at an edge of the picture not all samples count
+        luma, wanted = root_tone(luminance(images)), root_tone(luminance(target))
+        found, confidence = (cut(part, border) for part in matching_disparity(luma, offsets, Levels(), w, wanted))
+        error = F.smooth_l1_loss(disparity, found, reduction="none")
+        return (confidence * error).mean()  # one group a step is enough, and costs less than all
+    return 0 * prediction.disparity.sum()
+
+
+def cut(planes: Tensor, border: int) -> Tensor:
+    """(..., H, W) without `border` pixels on each side."""
+    return planes[..., border : planes.shape[-2] - border, border : planes.shape[-1] - border]
