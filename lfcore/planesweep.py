@@ -72,7 +72,7 @@ def plane_sweep(
     h, w = window.shape
     if out is None:
         out = torch.empty(luma.shape[1], 2 * levels.count, h, w, device=luma.device)
-    for level, shifted in enumerate(_shifted_inputs(luma, offsets, levels, window)):
+    for level, shifted in enumerate(shifted_inputs(luma, offsets, levels, window)):
         mean, deviation = _mean_and_deviation(shifted, (luma.shape[1], h, w), luma.device)
         out[:, level] = mean
         out[:, levels.count + level] = deviation
@@ -91,7 +91,7 @@ def matching_disparity(
     confidence (B, 1, h, w) in [0, 1]: how far the best level stands out.
     """
     costs = []
-    for shifted in _shifted_inputs(luma, offsets, levels, window):
+    for shifted in shifted_inputs(luma, offsets, levels, window):
         least, second = target.new_full(target.shape, math.inf), target.new_full(target.shape, math.inf)
         for part in shifted:
             difference = (part.image - target).abs_()
@@ -106,14 +106,14 @@ def matching_disparity(
 
 
 @dataclass(frozen=True)
-class _Shifted:
+class Shifted:
     """The part of a window in which a shifted input is valid, and its samples there."""
 
     image: Tensor  # (B, h', w')
     window: tuple[slice, slice]
 
 
-def _shifted_inputs(luma: Tensor, offsets: Tensor, levels: Levels, window: Window) -> Iterator[list[_Shifted]]:
+def shifted_inputs(luma: Tensor, offsets: Tensor, levels: Levels, window: Window) -> Iterator[list[Shifted]]:
     """For each level, the inputs that have any valid sample in the window."""
     height, width = luma.shape[-2:]
     for disparity in levels.values().tolist():
@@ -122,7 +122,7 @@ def _shifted_inputs(luma: Tensor, offsets: Tensor, levels: Levels, window: Windo
             across = _axis_shift(du * disparity, window.left, window.right, width)
             down = _axis_shift(dv * disparity, window.top, window.bottom, height)
             if across is not None and down is not None:
-                shifted.append(_Shifted(_shift(image, down, across), (down.window, across.window)))
+                shifted.append(Shifted(_shift(image, down, across), (down.window, across.window)))
         yield shifted
 
 
@@ -173,7 +173,7 @@ def _taps(source: Tensor, dim: int, taps: tuple[float, float, float, float], len
 
 
 def _mean_and_deviation(
-    shifted: list[_Shifted], shape: tuple[int, int, int], device: torch.device
+    shifted: list[Shifted], shape: tuple[int, int, int], device: torch.device
 ) -> tuple[Tensor, Tensor]:
     """Mean and standard deviation (N - 1) at each pixel over the inputs that are valid there: both (B, h, w)."""
     if len(shifted) > 1 and all(part.image.shape == shape for part in shifted):  # all valid: by far the commonest case
