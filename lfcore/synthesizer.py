@@ -234,7 +234,7 @@ class MeanSynthesizer:
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
 
 
-MODEL_NAMES = ("full", "mean")
+MODEL_NAMES = ("full", "mean", "planesweep")
 
 
 def make_synthesizer(model: str | Path = "full") -> Synthesizer:
@@ -247,6 +247,10 @@ def make_synthesizer(model: str | Path = "full") -> Synthesizer:
 
     if model == "mean":
         return MeanSynthesizer()
+    if model == "planesweep":
+        from lfcore.classical import PlaneSweepSynthesizer
+
+        return PlaneSweepSynthesizer()
     if isinstance(model, str) and model in MODEL_NAMES:
         path = weights_path(model)
     elif str(model).endswith(".safetensors"):
