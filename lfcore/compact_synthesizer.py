@@ -12,10 +12,10 @@ from lfcore.allocator import keep_freed_memory
 from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
-from lfcore.planesweep import Levels, Window, luminance, plane_sweep
+from lfcore.planesweep import Levels, Window, inner_plane_sweep, luminance
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, fastest_dtype, never, picture
 from lfcore.tone import root_tone, stored_from_root
-from lfcore.warp import backward_warp
+from lfcore.warp import quick_warp
 
 # How far the inputs are continued beyond their edges, px: 21 px of disparity at a viewpoint 0.25 outside, and the taps.
 REACH = 32
@@ -64,13 +64,13 @@ class CompactSynthesizer:
         clock = Clock()
         with torch.inference_mode(), torch.autocast("cpu", dtype=torch.bfloat16, enabled=self.dtype == torch.bfloat16):
             check_cancelled(cancelled)
-            features = plane_sweep(self._luma, offsets, levels, half)  # (1, 2 L, H' / 2, W' / 2)
+            features = inner_plane_sweep(self._luma, offsets, levels, half)  # (1, 2 L, H' / 2, W' / 2)
             clock.lap("features")
             check_cancelled(cancelled)
-            disparity = self._model.disparity(features.contiguous(memory_format=torch.channels_last))  # (1, 1, H', W')
+            disparity = self._model.disparity(features)  # (1, 1, H', W')
             clock.lap("disparity")
             check_cancelled(cancelled)
-            warped = backward_warp(self._toned, disparity.expand(4, -1, -1, -1), offsets, (REACH, REACH))  # (4, 3, H', W')
+            warped = quick_warp(self._toned, disparity, offsets, (REACH, REACH))  # (4, 3, H', W')
             clock.lap("warp")
             check_cancelled(cancelled)
             image = self._model.colour(warped.reshape(1, 12, height, width), disparity, torch.tensor([[u, v]]))

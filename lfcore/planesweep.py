@@ -8,7 +8,7 @@ the deviation is 0 (authors' code).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -77,6 +77,54 @@ def plane_sweep(
         out[:, level] = mean
         out[:, levels.count + level] = deviation
     return out
+
+
+def inner_plane_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window) -> Tensor:
+    """`plane_sweep` for a window all of whose samples lie inside the pictures; three times as fast.
+
+    All levels of an input are shifted at once by two convolutions, along x and along y, whose kernels hold the four taps of
+    each level at its place: most of their weights are 0, and still they beat one small operation per level and tap. Returns
+    (B, 2 L, h, w) float32 in torch's channels_last order, which the networks want. Memory: 6 L planes of the window.
+    """
+    shifted = [_shift_all(image, offset, levels, window) for image, offset in zip(luma, offsets.tolist(), strict=True)]
+    b, count, h, w = shifted[0].shape
+    out = torch.empty(b, 2 * count, h, w, device=luma.device, memory_format=torch.channels_last)
+    mean = shifted[0] + shifted[1]
+    for part in shifted[2:]:
+        mean.add_(part)
+    mean.mul_(1 / len(shifted))
+    out[:, :count] = mean
+    squares = shifted[0].sub_(mean).square_()
+    for part in shifted[1:]:
+        part.sub_(mean)
+        squares.addcmul_(part, part)
+    torch.sqrt(squares.mul_(1 / (len(shifted) - 1)), out=squares)
+    out[:, count:] = squares
+    return out
+
+
+def _shift_all(image: Tensor, offset: Sequence[float], levels: Levels, window: Window) -> Tensor:
+    """One input (B, H, W) at all levels: (B, L, h, w), channels_last."""
+    (first_x, across), (first_y, down) = (_level_taps(part, levels, image.device) for part in offset)
+    top, left = window.top + first_y, window.left + first_x
+    h, w = window.shape
+    rows, columns = h + down.shape[1] - 1, w + across.shape[1] - 1
+    if min(top, left) < 0 or top + rows > image.shape[1] or left + columns > image.shape[2]:
+        raise ValueError(f"samples of {window} lie outside the picture of {tuple(image.shape[1:])}")
+    source = image[:, None, top : top + rows, left : left + columns]
+    moved = F.conv2d(source, across[:, None, None, :]).contiguous(memory_format=torch.channels_last)
+    return F.conv2d(moved, down[:, None, :, None], groups=levels.count)
+
+
+def _level_taps(offset: float, levels: Levels, device: torch.device) -> tuple[int, Tensor]:
+    """The taps of every level's shift side by side: where the first lies from the output's place, and weights (L, K)."""
+    shifts = levels.values().double() * offset
+    whole = shifts.floor()
+    first, last = int(whole.min()) - 1, int(whole.max()) + 2
+    taps = torch.zeros(levels.count, last - first + 1, dtype=torch.float64)
+    places = (whole.long() - 1 - first).unsqueeze(1) + torch.arange(4)
+    taps.scatter_(1, places, cubic_taps(shifts - whole))
+    return first, taps.float().to(device)
 
 
 def matching_disparity(

@@ -7,6 +7,7 @@ which is why the warp is written out here. The sign of disparity is defined by `
 from __future__ import annotations
 
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 CUBIC_A = -0.5
@@ -61,6 +62,23 @@ def backward_warp(
     y = rows + offset[:, 1].view(n, 1, 1) * d
     sampled: Tensor = _CubicSample.apply(image, x, y)
     return sampled
+
+
+def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[int, int] = (0, 0)) -> Tensor:
+    """The same warp by torch's own bicubic sampling: ten times as fast, with a sharper kernel (a = -0.75).
+
+    For models trained with it, not for the paper's. Arguments as for `backward_warp`; the disparity of one map may serve all
+    N images (1, 1, h, w). What falls outside the picture repeats its edge.
+    """
+    _, _, height, width = image.shape
+    h, w = disparity.shape[-2:]
+    n = offset.shape[0]
+    d = disparity[:, 0]  # (N or 1, h, w)
+    rows = torch.arange(h, device=d.device, dtype=torch.float32).view(1, h, 1) + origin[0]
+    columns = torch.arange(w, device=d.device, dtype=torch.float32).view(1, 1, w) + origin[1]
+    x = (columns + offset[:, 0].view(n, 1, 1) * d) * (2 / (width - 1)) - 1  # grid_sample's -1 .. 1
+    y = (rows + offset[:, 1].view(n, 1, 1) * d) * (2 / (height - 1)) - 1
+    return F.grid_sample(image, torch.stack((x, y), -1), mode="bicubic", padding_mode="border", align_corners=True)
 
 
 class _CubicSample(torch.autograd.Function):

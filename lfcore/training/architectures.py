@@ -17,12 +17,12 @@ from lfcore.compact import CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
-from lfcore.planesweep import Levels, Window, plane_sweep
+from lfcore.planesweep import Levels, Window, inner_plane_sweep, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tone import root_tone
 from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
 from lfcore.training.patches import PatchGroup
-from lfcore.warp import backward_warp
+from lfcore.warp import backward_warp, quick_warp
 
 Autocast = Callable[[], torch.autocast]
 
@@ -159,28 +159,37 @@ class CompactPair:
     def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
         """See Architecture."""
         assert isinstance(model, CompactModel)
-        levels = half_resolution(model.config.levels)
-        continued = [_continued(images, group.window) for images, group in zip(batch.inputs, batch.groups, strict=True)]
-        padded, windows = [images for images, _ in continued], [window for _, window in continued]
-        features = torch.cat(
-            [
-                plane_sweep(half_luma(images), offsets, levels, _halved(window))
-                for images, offsets, window in zip(padded, batch.offsets, windows, strict=True)
-            ]
-        )  # (sum of B, 2 L, P / 2, P / 2)
-        with autocast():
-            disparity = model.disparity(features.contiguous(memory_format=torch.channels_last))  # (., 1, P, P)
+        places = _places(batch)
+        disparity = self._disparity(model, batch, places, autocast)
         pieces = disparity.split(batch.sizes)
         warped = torch.cat(
             [
-                warp_inputs(root_tone(images), piece, offsets, (window.top, window.left))
-                for images, piece, offsets, window in zip(padded, pieces, batch.offsets, windows, strict=True)
+                _quick_warp_inputs(root_tone(place.images), piece, offsets, place.window)
+                for place, piece, offsets in zip(places, pieces, batch.offsets, strict=True)
             ]
         )
         with autocast():
             image = model.colour(warped, disparity, batch.positions)  # (., 3, P, P)
         inside = slice(self.RIM, -self.RIM)
         return Prediction(image[:, :, inside, inside], self.RIM, disparity, 0)
+
+    def disparity(self, model: CompactModel, batch: Batch, autocast: Autocast) -> Tensor:
+        """The disparity alone, (sum of B, 1, P, P): what another model can be taught."""
+        return self._disparity(model, batch, _places(batch), autocast)
+
+    def _disparity(
+        self, model: CompactModel, batch: Batch, places: Sequence[_Place], autocast: Autocast
+    ) -> Tensor:
+        levels = half_resolution(model.config.levels)
+        features = torch.cat(
+            [
+                inner_plane_sweep(half_luma(place.images), offsets, levels, _halved(place.window))
+                for place, offsets in zip(places, batch.offsets, strict=True)
+            ]
+        )  # (sum of B, 2 L, P / 2, P / 2)
+        with autocast():
+            disparity: Tensor = model.disparity(features)  # (., 1, P, P)
+        return disparity
 
 
 class SingleNetwork:
@@ -238,13 +247,38 @@ def warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, origin: tupl
     return warped.view(n, b, c, *warped.shape[2:]).transpose(0, 1).flatten(1, 2)
 
 
-def _continued(inputs: Tensor, window: Window) -> tuple[Tensor, Window]:
+def _quick_warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, window: Window) -> Tensor:
+    """As `warp_inputs`, by the warp of the compact models."""
+    n, b, c, height, width = inputs.shape
+    warped = quick_warp(
+        inputs.reshape(n * b, c, height, width),
+        disparity.expand(n, *disparity.shape).flatten(0, 1),
+        offsets.to(disparity.device).repeat_interleave(b, 0),
+        (window.top, window.left),
+    )
+    return warped.view(n, b, c, *warped.shape[2:]).transpose(0, 1).flatten(1, 2)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Inputs of a group, and where in them its patches lie."""
+
+    images: Tensor  # (4, B, 3, H, W)
+    window: Window
+
+
+def _places(batch: Batch) -> list[_Place]:
+    return [_continued(images, group.window) for images, group in zip(batch.inputs, batch.groups, strict=True)]
+
+
+def _continued(inputs: Tensor, window: Window) -> _Place:
     """Inputs (4, B, 3, H, W) whose window reaches an edge of the picture, continued beyond it as the synthesizer does."""
     height, width = inputs.shape[-2:]
     if min(window.top, window.left, height - window.bottom, width - window.right) > 0:
-        return inputs, window  # the margin holds every sample
+        return _Place(inputs, window)  # the margin holds every sample
     padded = F.pad(inputs.flatten(0, 1), (REACH,) * 4, mode="replicate").unflatten(0, inputs.shape[:2])
-    return padded, Window(window.top + REACH, window.bottom + REACH, window.left + REACH, window.right + REACH)
+    moved = Window(window.top + REACH, window.bottom + REACH, window.left + REACH, window.right + REACH)
+    return _Place(padded, moved)
 
 
 def _halved(window: Window) -> Window:

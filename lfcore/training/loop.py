@@ -19,6 +19,7 @@ import torch
 import torch.nn.functional as F
 
 from lfcore.allocator import keep_freed_memory
+from lfcore.compact import CompactModel
 from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
@@ -45,6 +46,7 @@ class TrainConfig:
     warm_up_steps: int = 100  # learning rate grows from 0
     decay_share: float = 0.3  # of the steps, at the end, in which the learning rate falls to a hundredth
     loss: LossConfig = field(default_factory=LossConfig)
+    teacher: str = ""  # digest of the small pair whose disparity is a guide; empty: none
     initial: str = ""  # digest of the weights to go on from; empty: Xavier initialisation
     average: float = 0.999  # decay of the running average of the weights; the average is what is validated and shipped
     seed: int = 1
@@ -106,6 +108,7 @@ def train(
     initial: Weights | None = None,
     team: Team = ALONE,
     generated: Sequence[TrainingScene] = (),
+    teacher: Weights | None = None,
 ) -> None:
     """Train from `initial` or anew until `config.steps`, `runtime.stop_after_minutes` or `stopped()`; if `run_dir` holds a
     checkpoint, go on from there.
@@ -113,14 +116,14 @@ def train(
     Writes `out` (the averaged weights that scored best on `validation`, or the newest where there is none), and in `run_dir`
     checkpoint.safetensors, curve.csv and curve.png. With a `team` of several processes each takes its share of every batch,
     and the first alone validates, writes and reports; all must see the same `run_dir`. `generated` scenes, whose range of
-    disparities is known, are drawn for `config.generated_share` of the patches. Raises InputError for scenes too small and
-    for a checkpoint of another configuration.
+    disparities is known, are drawn for `config.generated_share` of the patches. A `teacher` guides the disparity. Raises
+    InputError for scenes too small and for a checkpoint of another configuration.
     """
     keep_freed_memory()
     for light_field in validation:
         k16_view(light_field)  # refuses corners alone now, not after the first minutes
-    config = _settled(config, initial, team)
-    trainer = Trainer(config, _device(runtime.device), run_dir, initial.model if initial else None, team)
+    config = _settled(config, initial, teacher, team)
+    trainer = Trainer(config, _device(runtime.device), run_dir, initial.model if initial else None, team, teacher)
     prepared = [prepare_scene(scene) for scene in scenes]
     check_room([*prepared, *generated], config.patches, trainer.levels)
     prepared = mixed(prepared, generated, config.generated_share)
@@ -150,11 +153,14 @@ def train(
                 return
 
 
-def _settled(config: TrainConfig, initial: Weights | None, team: Team) -> TrainConfig:
+def _settled(config: TrainConfig, initial: Weights | None, teacher: Weights | None, team: Team) -> TrainConfig:
     """The config with what the other arguments decide. Raises InputError where they do not fit together."""
     groups = config.patches.batch // config.patches.group
     if groups % team.size:
         raise InputError(f"{groups} groups of patches a step cannot be shared by {team.size} processes; change the batch.")
+    if teacher is not None and not isinstance(teacher.model, CompactModel):
+        raise InputError(f"The teacher's weights are those of {teacher.model.config.name}; only realtime can teach.")
+    config = replace(config, teacher=teacher.digest if teacher else "")
     if initial is None:
         return config
     if initial.model.config.name != config.model:
@@ -172,6 +178,7 @@ class Trainer:
         run_dir: Path,
         initial: Model | None = None,
         team: Team = ALONE,
+        teacher: Weights | None = None,
     ) -> None:
         self._config = config
         self._device = device
@@ -186,7 +193,8 @@ class Trainer:
         self._average = copy.deepcopy(self._model)
         self._optimiser = torch.optim.Adam(self._model.parameters(), lr=config.learning_rate, betas=(0.9, 0.999), fused=True)
         bfloat16 = device.type == "cuda" or fastest_dtype() == torch.bfloat16
-        self._loss = team.share(StepLoss(self._model, self._architecture, config.loss, bfloat16))
+        guide = teacher.model.eval().to(device) if teacher and isinstance(teacher.model, CompactModel) else None
+        self._loss = team.share(StepLoss(self._model, self._architecture, config.loss, bfloat16, guide))
         self._curve: list[CurvePoint] = []
         self._seconds = 0.0
         self._resumed = time.monotonic()

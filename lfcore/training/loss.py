@@ -8,11 +8,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from lfcore.compact import CompactModel
 from lfcore.models import Model
 from lfcore.networks import BORDER
 from lfcore.planesweep import Levels, luminance, matching_disparity
 from lfcore.tone import root_tone
-from lfcore.training.architectures import Architecture, Batch, Prediction
+from lfcore.training.architectures import Architecture, Batch, CompactPair, Prediction
 
 
 @dataclass(frozen=True)
@@ -21,18 +22,27 @@ class LossConfig:
 
     matching_steps: int = 1000  # in which the disparity is also drawn to the plane sweep's best match (see matching_disparity)
     matching_weight: float = 0.03
+    teacher_weight: float = 0.1  # of the distance to a teacher's disparity, px, where there is a teacher
     balance: float = 0.0  # a patch's squared error is divided by (its variance + 0.005) ** balance; 0 is the paper's loss
 
 
 class StepLoss(nn.Module):
     """A module around the model, so that PyTorch's DistributedDataParallel sees one forward pass from patches to loss."""
 
-    def __init__(self, model: Model, architecture: Architecture, config: LossConfig, bfloat16: bool) -> None:
+    def __init__(
+        self,
+        model: Model,
+        architecture: Architecture,
+        config: LossConfig,
+        bfloat16: bool,
+        teacher: CompactModel | None = None,
+    ) -> None:
         super().__init__()
         self.model = model
         self._architecture = architecture
         self._config = config
         self._bfloat16 = bfloat16
+        self._teacher = [teacher] if teacher else []  # in a list, so that it is no part of what is trained
 
     def forward(self, batch: Batch, step: int) -> tuple[Tensor, Tensor]:
         """(mean squared error over RGB, loss), both scalars."""
@@ -45,7 +55,16 @@ class StepLoss(nn.Module):
         fading = 1 - step / max(self._config.matching_steps, 1)
         if fading > 0 and prediction.disparity is not None:
             loss = loss + self._config.matching_weight * fading * _matching_loss(batch, prediction)
+        if self._teacher and prediction.disparity is not None:
+            loss = loss + self._config.teacher_weight * self._teaching_loss(batch, prediction)
         return errors.detach().mean(), loss
+
+    def _teaching_loss(self, batch: Batch, prediction: Prediction) -> Tensor:
+        """Distance of the disparity from that of a small model that has been trained already."""
+        assert prediction.disparity is not None
+        with torch.no_grad():
+            wanted = CompactPair().disparity(self._teacher[0], batch, self._autocast)
+        return F.smooth_l1_loss(prediction.disparity, cut(wanted, prediction.disparity_border))
 
     def _autocast(self) -> torch.autocast:
         device = next(self.model.parameters()).device
