@@ -102,4 +102,4 @@ def test_the_quick_warp_moves_as_the_papers_warp_does() -> None:
     offset = torch.tensor([[-0.4, 0.3], [0.6, -0.7]])
     found = quick_warp(image, disparity, offset, (10, 10))
     expected = backward_warp(image, disparity.expand(2, -1, -1, -1), offset, (10, 10))
-    torch.testing.assert_close(found, expected, atol=2e-3, rtol=0)
+    torch.testing.assert_close(found, expected, atol=6e-3, rtol=0)
