@@ -88,9 +88,13 @@ def write_picture(path: str | os.PathLike[str], picture: npt.NDArray[np.uint8]) 
 
 def write_disparity(path: str | os.PathLike[str], disparity: FloatArray) -> None:
     """Write a disparity map (H, W), px over the full corner-to-corner baseline: TIFF or EXR, one channel, float32."""
-    target = check_target(path, DISPARITY_EXTENSIONS)
     note = "disparity in pixels over the full corner-to-corner baseline; positive: content moves to larger x as u grows"
-    _write(target, disparity[..., None], "float", {"ImageDescription": note})
+    write_map(path, disparity, note)
+
+
+def write_map(path: str | os.PathLike[str], values: FloatArray, note: str) -> None:
+    """Write a map of one value (H, W), with a note of what it is, unit and sign: TIFF or EXR, one channel, float32."""
+    _write(check_target(path, DISPARITY_EXTENSIONS), values[..., None], "float", {"ImageDescription": note})
 
 
 def write_warped(folder: str | os.PathLike[str], warped: FloatArray, extension: str) -> list[Path]:

@@ -363,8 +363,7 @@ def test_a_lytro_container_is_recognised_by_its_magic(tmp_path: Path) -> None:
     path = tmp_path / "IMG_0001.png"
     path.write_bytes(b"\x89LFP\r\n\x1a\n" + struct.pack(">II", 1, 0) + bytes(100))
     message = refusal(path)
-    assert "Lytro container" in message
-    assert "ESLF" in message
+    assert "section 1 of the Lytro container" in message
 
 
 def test_a_picture_that_does_not_divide_or_is_asked_for_too_many_views(tmp_path: Path) -> None:

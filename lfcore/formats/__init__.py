@@ -11,11 +11,12 @@ from lfcore.errors import InputError
 from lfcore.formats import eslf, views_folder
 from lfcore.formats.describe import describe
 from lfcore.formats.images import check_memory, read_header
+from lfcore.formats.lytro.container import is_container, open_container
+from lfcore.formats.lytro.contents import Kind, read_contents
+from lfcore.formats.lytro.extras import describe as describe_container
 from lfcore.lightfield import LightField
 
 __all__ = ["describe", "open_light_field"]
-
-_LYTRO_MAGIC = b"\x89LFP\r\n\x1a\n"
 
 _KINDS = "an ESLF picture (14 x 14 px per microlens) or a folder with one picture per view"
 
@@ -66,13 +67,15 @@ def _check_reachable(path: Path) -> None:
 
 
 def _refuse_lytro_container(path: Path) -> None:
-    try:
-        with path.open("rb") as file:
-            magic = file.read(len(_LYTRO_MAGIC))
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}; check its permissions.") from error
-    if magic == _LYTRO_MAGIC:
+    if not is_container(path):
+        return
+    container = open_container(path)
+    contents = read_contents(container)
+    if contents.kind is Kind.CAPTURE:
         raise InputError(
-            f"{path} is a Lytro container, whose raw picture is not decoded yet; export it as ESLF or as a folder of "
+            f"{path} is a Lytro capture, whose raw picture is not decoded yet; export it as ESLF or as a folder of "
             "views and open that."
         )
+    raise InputError(
+        f"{describe_container(container, contents).rstrip('.')}; `lfview info --extract DIR` writes out what the file holds."
+    )

@@ -10,10 +10,12 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from lfcore.formats.lytro.container import Container, Section
-from lfcore.formats.lytro.fields import Fields
+from lfcore.formats.lytro.fields import Fields, printable
 from lfcore.formats.lytro.metadata import Capture, read_capture
 
 _MAX_PICTURE_SIDE = 65_535
+_MAX_PLACE = 120  # characters
+_MAX_FILE_NAME = 100
 
 # How the acceleration structures of both generations are called in words.
 _STRUCTURES = {
@@ -27,6 +29,7 @@ _STRUCTURES = {
     "compressed": "compressed mosaic",
 }
 _STACK = "refocus stack"
+_MAPS = {"depthMap": "depth map", "confidenceMap": "confidence", "depthLut": "depth table"}
 
 
 class Kind(Enum):
@@ -115,14 +118,14 @@ def _kind(stored: Contents) -> Kind:
     return Kind.METADATA if stored.capture is not None else Kind.UNKNOWN
 
 
-def raw_hint(container: Container, capture: Capture | None) -> str:
-    """Where the raw capture that belongs to a file without one is to be looked for, as the end of a sentence."""
+def raw_file(container: Container, capture: Capture | None) -> str:
+    """In words, which file would have the mosaic that belongs to a container without one."""
     stem = container.path.stem
     for suffix in ("-stk", "-dm"):
         if stem.lower().endswith(suffix):
-            return f"the raw capture would be {stem[: -len(suffix)]}.lfp"
+            return f"{stem[: -len(suffix)]}.lfp"
     name = None if capture is None else capture.facts.file_name
-    return f"the raw capture would be {name[:40]}.LFR" if name else "the raw capture is a file of 16 MB (.lfp) or 55 MB (.LFR)"
+    return f"{name[:40]}.LFR" if name else "a file of 16 MB (.lfp, first generation) or 55 MB (.LFR, Illum)"
 
 
 def roles(container: Container) -> dict[str, str]:
@@ -132,12 +135,17 @@ def roles(container: Container) -> dict[str, str]:
     while waiting:
         place, value = waiting.popleft()
         if isinstance(value, dict):
-            waiting += [(f"{place}.{key}" if place else key, child) for key, child in value.items()]
+            waiting += [(_shortened(f"{place}.{key}" if place else key), child) for key, child in value.items()]
         elif isinstance(value, list):
-            waiting += [(f"{place}[{index}]", child) for index, child in enumerate(value)]
+            waiting += [(_shortened(f"{place}[{index}]"), child) for index, child in enumerate(value)]
         elif isinstance(value, str) and (section := container.find(value)) is not None:
-            found.setdefault(section.name, place)
+            found.setdefault(section.name, printable(place))
     return found
+
+
+def _shortened(place: str) -> str:
+    # Keys may be long, and deep: each place would hold all those above it.
+    return place if len(place) <= _MAX_PLACE else f"..{printable(place[-_MAX_PLACE:])}"
 
 
 def _structures(container: Container) -> Iterator[tuple[str, Fields]]:
@@ -197,14 +205,14 @@ def _video(container: Container, label: str, block: Fields) -> Iterator[StoredPi
 
 
 def _maps(container: Container) -> Iterator[StoredMap]:
-    labels = {"depthMap": "depth map", "confidenceMap": "confidence", "depthLut": "depth table"}
     for _, structure in _structures(container):
-        for key, label in labels.items():
+        for key, label in _MAPS.items():
             entry = structure.child(key)
             section = container.find(entry.text("imageRef"))
             # The first generation writes the size and the range beside the map, the Illum into it.
             width = _side(entry, "width") or _side(structure, "width")
             height = _side(entry, "height") or _side(structure, "height")
+            span = (entry if "minLambda" in entry else structure) if label == "depth map" else Fields({}, "")
             if section is not None and width and height:
                 yield StoredMap(
                     label=label,
@@ -212,8 +220,8 @@ def _maps(container: Container) -> Iterator[StoredMap]:
                     representation=_representation(entry) or "raw",
                     width=width,
                     height=height,
-                    low=_first(entry.number("minLambda"), structure.number("minLambda")),
-                    high=_first(entry.number("maxLambda"), structure.number("maxLambda")),
+                    low=span.number("minLambda"),
+                    high=span.number("maxLambda"),
                 )
 
 
@@ -222,7 +230,7 @@ def _files(container: Container) -> Iterator[StoredFile]:
         section = container.find(entry.text("dataRef"))
         # Names are paths on the camera, such as C:\T1CALIB\MOD_0000.RAW: only the last part is a name here.
         name = PurePosixPath((entry.text("name") or "").replace("\\", "/")).name
-        if section is not None and name not in ("", ".", ".."):
+        if section is not None and name not in ("", ".", "..") and len(name) <= _MAX_FILE_NAME:
             yield StoredFile(name, section)
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lfcore.errors import InputError
 from lfcore.formats.images import open_picture
 from lfcore.formats.lytro.container import Container, Section
-from lfcore.formats.lytro.contents import Contents, Kind, StoredMap, StoredPicture, raw_hint
+from lfcore.formats.lytro.contents import Contents, Kind, StoredMap, StoredPicture, raw_file
 
 Picture = npt.NDArray[np.uint8]
 Map = npt.NDArray[np.float32]
@@ -66,7 +66,7 @@ def describe(container: Container, contents: Contents) -> str:
         return f"{held}."
     if contents.kind is Kind.CALIBRATION:
         return f"{held}; give it as calibration when a capture of that camera is decoded."
-    return f"{held}; {raw_hint(container, contents.capture)}."
+    return f"{held}; the raw capture would be {raw_file(container, contents.capture)}."
 
 
 def read_extras(container: Container, contents: Contents) -> Extras:

@@ -37,6 +37,11 @@ def to_json(value: Mapping[str, Any]) -> bytes:
     return json.dumps(value, indent="\t", separators=(",", " : "), allow_nan=False).encode()
 
 
+def printable(text: str) -> str:
+    """The text with a question mark for each character that cannot be printed, such as line breaks."""
+    return text if text.isprintable() else "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
 def check_json_size(length: int, source: str) -> None:
     """Raise InputError for more bytes than a camera's metadata takes; `source` begins the message."""
     if length > MAX_JSON_BYTES:
@@ -105,11 +110,11 @@ class Fields:
         return tuple(self._number(f"{key}[{index}]", value, low, high) for index, value in enumerate(values))
 
     def text(self, key: str) -> str | None:
-        """A string; the empty one counts as missing."""
+        """A string, characters that cannot be printed replaced; the empty one counts as missing."""
         value = self.values.get(key)
         if value is not None and not isinstance(value, str):
             raise self._wrong(key, value, "text")
-        return value or None
+        return printable(value) if value else None
 
     def flag(self, key: str) -> bool | None:
         """true or false."""
