@@ -1,13 +1,15 @@
 """Textures, passes and read-back: the only place that knows moderngl.
 
 Every way of looking is a shader over the same textures: the four corner views, the newest synthesis with its disparity
-map, and the captured view. Nothing shown is computed on the CPU. Pictures lie in textures with their first row first.
+map, the synthesis before it, and the captured view. Nothing shown is computed on the CPU. What is shown is made at the
+light field's own size in 8 bits, as the screen has, and only when it has changed; the window then magnifies it. Pictures
+lie in textures with their first row first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -15,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app import glsl
-from app.state import Look, Placement, Point, Rect, Size
+from app.state import Look, Placement, Point, Rect, Size, carried_share
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray
@@ -29,6 +31,7 @@ _TONES = {False: "tone_stored.glsl", True: "tone_bright.glsl"}  # by Frame.displ
 _SHEET_PLACES = tuple((int(u), int(v)) for u, v in CORNERS)
 
 _AnyTexture = moderngl.Texture | moderngl.TextureArray
+Pixels = npt.NDArray[np.uint8]
 Uniform = float | int | bool | tuple[float, ...] | tuple[tuple[float, float], ...]
 
 
@@ -38,7 +41,7 @@ class Frame:
 
     look: Look
     viewpoint: Point
-    full_share: float = 0.0  # how far the synthesis has been faded in over the instant picture
+    share: float = 1.0  # how far the newest synthesis has been faded in over what was there before
     captured: bool = False  # the camera's own view in place of a synthesis
     display_tone: bool = False
     gain: float = 1.0
@@ -55,16 +58,19 @@ class Target:
 
 
 class Canvas:
-    """The picture in the window. All methods need the GL context to be current, on the thread that made the canvas."""
+    """The picture in the window. All methods need the GL context to be current, on the thread that made the canvas.
 
-    def __init__(self, context: moderngl.Context) -> None:
+    `picture_type`: moderngl's type of the pictures that are shown; "f1" is 8 bits, "f4" float32 to read them back exactly.
+    """
+
+    def __init__(self, context: moderngl.Context, picture_type: str = "f1") -> None:
         self.context = context
-        self._blend = _Pass(context, "blend.frag")
-        self._carry = _Pass(context, "carry.frag")
-        self._instant = _Pass(context, "instant.frag")
-        self._warped = _Pass(context, "warped.frag")
-        self._fade = _Pass(context, "fade.frag")
-        self._shows: dict[tuple[str, str, str], _Pass] = {}  # by fragment shader, sampling and tone, made when first used
+        self._picture_type = picture_type
+        self._passes: dict[tuple[str, ...], _Pass] = {}  # by fragment shader and what it includes, made when first used
+        for fragment in ("blend.frag", "instant.frag", "exact.frag", "fade.frag"):
+            self._pass(fragment)  # compiled now, so that the hand's first movement does not wait for them
+        for fade in ("fade_none.glsl", "fade_older.glsl"):
+            self._pass("carried.frag", fade=fade)
         colours = colormaps.disparity_colours()  # (256, 3)
         self._colours = context.texture((len(colours), 1), 3, colours.tobytes(), alignment=1)
         self._colours.repeat_x = self._colours.repeat_y = False
@@ -84,7 +90,7 @@ class Canvas:
                 f"open a light field with smaller views."
             )
         self.clear()
-        self._pictures = _Pictures(self.context, corners)
+        self._pictures = _Pictures(self.context, corners, self._picture_type)
 
     def clear(self) -> None:
         """Forget the light field and everything that belongs to it."""
@@ -93,19 +99,28 @@ class Canvas:
             self._pictures.release()
             self._pictures = None
 
-    def set_synthesis(self, image: FloatArray, disparity: FloatArray | None, viewpoint: Point) -> None:
-        """Take the newest synthesis: image (H, W, 3), disparity (H, W) in px over the baseline or None, and its (u, v)."""
+    def set_synthesis(self, image: FloatArray, pixels: Pixels, disparity: FloatArray | None, viewpoint: Point) -> None:
+        """Take the newest synthesis: image (H, W, 3), the same as uint8 (H, W, 4), disparity (H, W) in px over the baseline
+        or None, and its (u, v).
+
+        The one before is kept for the cross-fade. Both are carried in 8 bits, which costs a software rasteriser half the time.
+        """
         pictures = self._at_hand
-        pictures.image.write(np.ascontiguousarray(image, np.float32))
+        pictures.older_at, pictures.newest_at = pictures.newest_at, viewpoint
+        pictures.newest = 1 - pictures.newest
+        width, height = pictures.size
+        pictures.syntheses.write(pixels, viewport=(0, 0, pictures.newest, width, height, 1))
+        pictures.exact.write(np.ascontiguousarray(image, np.float32))
         if disparity is not None:
             pictures.disparity_map.write(np.ascontiguousarray(disparity, np.float32))
             pictures.nearest_disparity = float(disparity.min())
             pictures.made_at = viewpoint
-            pictures.current.clear()
+        pictures.current.clear()
 
     def set_captured(self, view: npt.NDArray[np.generic]) -> None:
         """Take the captured view (H, W, 3), as stored, to be compared with or looked at."""
         self._at_hand.captured.write(np.ascontiguousarray(view))
+        self._at_hand.current.clear()
 
     @property
     def has_light_field(self) -> bool:
@@ -123,45 +138,47 @@ class Canvas:
 
     # Drawing.
 
-    def begin(self, target: Target) -> None:
-        """Start a frame: all of the target in the background colour."""
-        framebuffer = target.framebuffer
-        framebuffer.viewport = framebuffer.scissor = (0, 0, *target.size)
+    def begin(self, target: Target, rectangles: Sequence[tuple[Rect, tuple[float, float, float]]] = ()) -> None:
+        """Start a frame: all of the target in the background colour, and rectangles (in its pixels, y downwards) in others.
+
+        Clearing is the cheapest way of filling that there is, which counts where the processor draws.
+        """
+        framebuffer, (width, height) = target.framebuffer, target.size
+        framebuffer.viewport = framebuffer.scissor = (0, 0, width, height)
         framebuffer.use()
         framebuffer.clear(*BACKGROUND, 1.0)
+        for area, colour in rectangles:
+            left, right = round(area.x), round(area.x + area.width)
+            top, bottom = round(area.y), round(area.y + area.height)
+            framebuffer.clear(*colour, 1.0, viewport=(left, height - bottom, right - left, bottom - top))
 
     def prepare(self, frame: Frame) -> bool:
-        """Make the pictures at the light field's own size that the frame shows; whether any was not up to date."""
+        """Make the picture at the light field's own size that the frame shows; whether it was not up to date."""
         made = self._at_hand.made
-        if frame.look is Look.WARPED_ALL:
-            self._make_sheet(frame.viewpoint)
-        elif frame.look.corner is not None:
-            self._make_warped(frame.look.corner, frame.viewpoint)
-        elif frame.look is Look.DISPARITY:
-            self._carry_disparity(frame.viewpoint)
-        elif frame.full_share < 1.0 and not _shows_captured(frame):
-            self._make_instant(frame.viewpoint)
-            if frame.full_share > 0.0:
-                self._make_faded(frame.full_share)
+        self._texture_of(frame)
         return self._at_hand.made != made
 
     def draw(self, frame: Frame, target: Target, area: Rect, placement: Placement) -> None:
         """Draw the frame's picture into the target, inside the area (in its pixels, y downwards), at the placement."""
-        self.prepare(frame)
+        texture = self._texture_of(frame)
         framebuffer, (width, height) = target.framebuffer, target.size
         visible = _visible(self.picture_size(frame.look), area, placement)
         framebuffer.viewport = (0, 0, width, height)
         framebuffer.scissor = (visible.x, height - visible.y - visible.height, visible.width, visible.height)
         framebuffer.use()
-        self._show(
-            frame,
-            _sampling(placement.scale),
-            {"origin": placement.origin, "scale": placement.scale, "window_height": float(height)},
-        )
+        sampling = _sampling(placement.scale)
+        placed: dict[str, Uniform] = {"origin": placement.origin, "scale": placement.scale, "window_height": float(height)}
+        if frame.look is Look.DISPARITY:
+            show = self._pass("show_disparity.frag", sampled=sampling)
+            textures = {"disparity": texture, "colours": self._colours}
+            show.render(textures, {**placed, "range": frame.disparity_range})
+        else:
+            show = self._pass("show_image.frag", sampled=sampling)
+            show.render({"picture": texture}, {**placed, "dim": frame.dim})
         framebuffer.scissor = (0, 0, width, height)
 
     def read(self, frame: Frame) -> FloatArray:
-        """What `draw` would show of this frame at one window pixel per picture pixel: float32 (H, W, 3), not clipped."""
+        """What `draw` would show of this frame at one window pixel per picture pixel: float32 (H, W, 3)."""
         width, height = self.picture_size(frame.look)
         texture = self.context.texture((width, height), 4, dtype="f4")
         framebuffer = self.context.framebuffer([texture])
@@ -175,96 +192,154 @@ class Canvas:
             texture.release()
         return values.reshape(height, width, 3)[::-1].copy()  # GL's first row is the lowest
 
-    def finish(self) -> None:
-        """Wait until the graphics have done everything asked so far."""
-        self.context.finish()
+    def timer(self) -> moderngl.Query:
+        """A timer of what is drawn within it, by the graphics' own clock; read it one frame later, so that nothing waits."""
+        return self.context.query(time=True)
 
-    def _show(self, frame: Frame, sampling: str, placed: Mapping[str, Uniform]) -> None:
-        pictures = self._at_hand
+    def _pass(self, fragment: str, **included: str) -> _Pass:
+        """The fragment shader with these files in place of the includes NAME.glsl; the tone is as stored if not told."""
+        instead = {"tone": _TONES[False], **included}
+        key = (fragment, *(f"{name}:{file}" for name, file in sorted(instead.items())))
+        if key not in self._passes:
+            self._passes[key] = _Pass(self.context, fragment, {f"{name}.glsl": file for name, file in instead.items()})
+        return self._passes[key]
+
+    # Pictures at the light field's own size. Each is made anew only if what it shows has changed.
+
+    def _texture_of(self, frame: Frame) -> moderngl.Texture:
+        pictures, tone = self._at_hand, _TONES[frame.display_tone]
         if frame.look is Look.DISPARITY:
-            textures: Mapping[str, _AnyTexture] = {"disparity": pictures.disparity, "colours": self._colours}
-            show = self._show_pass("show_disparity.frag", sampling)
-            show.render(textures, {**placed, "range": frame.disparity_range})
-        elif frame.look is Look.ERROR:
-            textures = {"picture": self._picture_of(frame), "captured": pictures.captured}
-            show = self._show_pass("show_error.frag", sampling)
-            show.render(textures, {**placed, "gain": frame.gain})
-        else:
-            show = self._show_pass("show_image.frag", sampling, _TONES[frame.display_tone])
-            show.render({"picture": self._picture_of(frame)}, {**placed, "dim": frame.dim})
-
-    def _show_pass(self, fragment: str, sampling: str, tone: str = "") -> _Pass:
-        key = (fragment, sampling, tone)
-        if key not in self._shows:
-            self._shows[key] = _Pass(self.context, fragment, {"sampled.glsl": sampling, "tone.glsl": tone})
-        return self._shows[key]
-
-    def _picture_of(self, frame: Frame) -> moderngl.Texture:
-        pictures = self._at_hand
+            self._carry_disparity(frame.viewpoint)
+            return pictures.disparity
         if frame.look is Look.WARPED_ALL:
-            return pictures.sheet
+            self._make_sheet(frame.viewpoint, tone)
+            return pictures.sheet.texture
         if frame.look.corner is not None:
-            return pictures.warped
-        if _shows_captured(frame):
-            return pictures.captured
-        if frame.full_share <= 0.0:
-            return pictures.instant
-        return pictures.image if frame.full_share >= 1.0 else pictures.faded
+            if pictures.picture.outdated("warped", frame.viewpoint, frame.look.corner, tone):
+                self._warp_into(pictures.picture.target, frame.look.corner, (0, 0), frame.viewpoint, tone)
+            return pictures.picture.texture
+        if frame.look is Look.ERROR:
+            return self._error(frame)
+        if frame.captured:
+            return self._copied(pictures.picture, pictures.captured, 0, tone).texture
+        return self._synthesis(frame.viewpoint, frame.share, tone).texture
 
-    # Passes at the light field's own size.
-
-    def _make_instant(self, viewpoint: Point) -> None:
+    def _error(self, frame: Frame) -> moderngl.Texture:
         pictures = self._at_hand
-        if not pictures.outdated("instant", viewpoint):
-            return
-        if pictures.made_at is None:
-            pictures.instant_target.use()
-            self._blend.render({"corner_views": pictures.corner_views}, {"viewpoint": viewpoint})
-            return
-        self._carry_disparity(viewpoint)
-        pictures.instant_target.use()
-        textures: Mapping[str, _AnyTexture] = {"corner_views": pictures.corner_views, "disparity": pictures.disparity}
-        self._instant.render(textures, {"viewpoint": viewpoint})
+        result = pictures.picture
+        if not result.outdated("error", frame.viewpoint, frame.share, frame.gain):
+            return result.texture
+        if pictures.newest_at == frame.viewpoint and frame.share >= 1.0:
+            # In float32, since the steps of 8 bits would be seen when they are multiplied by the gain.
+            shown = self._copied(pictures.precise, pictures.exact, 0, _TONES[False])
+        else:
+            shown = self._synthesis(frame.viewpoint, frame.share, _TONES[False])
+        result.target.use()
+        textures: Mapping[str, _AnyTexture] = {"picture": shown.texture, "captured": pictures.captured}
+        self._pass("error.frag").render(textures, {"gain": frame.gain})
+        return result.texture
+
+    def _synthesis(self, viewpoint: Point, share: float, tone: str) -> _Picture:
+        """The best picture of this viewpoint that can be made of the newest synthesis, the one before it and the corners."""
+        pictures = self._at_hand
+        newest, older = pictures.newest_at, pictures.older_at if share < 1.0 else None
+        if newest is None:
+            return self._corners(viewpoint, False, tone)
+        if newest == viewpoint and older in (viewpoint, None):
+            after = self._copied(pictures.after, pictures.exact, 0, tone)
+            if share >= 1.0:
+                return after
+            if older is not None:
+                before = self._copied(pictures.before, pictures.syntheses, 1 - pictures.newest, tone)
+                return self._mixed(before, after, share)
+            return self._mixed(self._corners(viewpoint, False, tone), after, share)
+        if pictures.made_at != newest:  # it has come without a disparity map, and so cannot be carried
+            return self._corners(viewpoint, pictures.made_at is not None, tone)
+        near = carried_share(math.dist(newest, viewpoint))
+        if near <= 0.0:
+            return self._corners(viewpoint, True, tone)
+        after = self._carried(viewpoint, older, share, tone)
+        if share < 1.0 and older is None:
+            return self._mixed(self._corners(viewpoint, False, tone), after, share * near)
+        return after if near >= 1.0 else self._mixed(self._corners(viewpoint, True, tone), after, near)
+
+    def _copied(self, result: _Picture, source: moderngl.TextureArray, layer: int, tone: str) -> _Picture:
+        """A layer of these pictures, pixel by pixel."""
+        if result.outdated("copy of", source, layer, tone):
+            result.target.use()
+            self._pass("exact.frag", tone=tone).render({"pictures": source}, {"layer": layer})
+        return result
+
+    def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: str) -> _Picture:
+        """The newest synthesis, and where `older` is given also that one, carried to the viewpoint."""
+        pictures = self._at_hand
+        result = pictures.after
+        if not result.outdated("carried", viewpoint, older, share, tone):
+            return result
+        uniforms: dict[str, Uniform] = {**self._carrying(viewpoint), "newest": pictures.newest}
+        fade = "fade_none.glsl"
+        if older is not None:
+            fade = "fade_older.glsl"
+            uniforms |= {"older_at": older, "share": share}
+        result.target.use()
+        textures: Mapping[str, _AnyTexture] = {"syntheses": pictures.syntheses, "disparity_map": pictures.disparity_map}
+        self._pass("carried.frag", fade=fade, tone=tone).render(textures, uniforms)
+        return result
+
+    def _corners(self, viewpoint: Point, warped: bool, tone: str) -> _Picture:
+        """The four corner views, blended as they are or warped by the newest disparity."""
+        pictures = self._at_hand
+        result = pictures.before
+        if not result.outdated("corners", viewpoint, warped, tone):
+            return result
+        result.target.use()
+        if warped:
+            textures: Mapping[str, _AnyTexture] = {
+                "corner_views": pictures.corner_views,
+                "disparity_map": pictures.disparity_map,
+            }
+            self._pass("instant.frag", tone=tone).render(textures, self._carrying(viewpoint))
+        else:
+            self._pass("blend.frag", tone=tone).render({"corner_views": pictures.corner_views}, {"viewpoint": viewpoint})
+        return result
+
+    def _mixed(self, before: _Picture, after: _Picture, share: float) -> _Picture:
+        result = self._at_hand.picture
+        if result.outdated("mixed", before.made_for, after.made_for, share):
+            result.target.use()
+            self._pass("fade.frag").render({"before": before.texture, "after": after.texture}, {"share": share})
+        return result
+
+    def _carrying(self, viewpoint: Point) -> dict[str, Uniform]:
+        """The uniforms of carry.glsl and the viewpoint."""
+        pictures = self._at_hand
+        made_at = pictures.made_at
+        assert made_at is not None
+        return {"made_at": made_at, "nearest_disparity": pictures.nearest_disparity, "viewpoint": viewpoint}
 
     def _carry_disparity(self, viewpoint: Point) -> None:
         pictures = self._at_hand
         if pictures.made_at is None or not pictures.outdated("disparity", viewpoint):
             return
         pictures.disparity_target.use()
-        self._carry.render(
-            {"disparity_map": pictures.disparity_map},
-            {
-                "made_at": pictures.made_at,
-                "viewpoint": viewpoint,
-                "nearest_disparity": pictures.nearest_disparity,
-            },
-        )
+        self._pass("carry.frag").render({"disparity_map": pictures.disparity_map}, self._carrying(viewpoint))
 
-    def _make_faded(self, share: float) -> None:
+    def _make_sheet(self, viewpoint: Point, tone: str) -> None:
         pictures = self._at_hand
-        pictures.faded_target.use()
-        self._fade.render({"before": pictures.instant, "after": pictures.image}, {"share": share})
-
-    def _make_warped(self, corner: int, viewpoint: Point) -> None:
-        pictures = self._at_hand
-        if pictures.outdated("warped", viewpoint, corner):
-            self._carry_disparity(viewpoint)
-            self._warp_into(pictures.warped_target, corner, (0, 0), viewpoint)
-
-    def _make_sheet(self, viewpoint: Point) -> None:
-        pictures = self._at_hand
-        if not pictures.outdated("sheet", viewpoint):
+        if not pictures.sheet.outdated("sheet", viewpoint, tone):
             return
-        self._carry_disparity(viewpoint)
         width, height = pictures.size
         for corner, (column, row) in enumerate(_SHEET_PLACES):
-            self._warp_into(pictures.sheet_target, corner, (column * width, row * height), viewpoint)
+            self._warp_into(pictures.sheet.target, corner, (column * width, row * height), viewpoint, tone)
 
-    def _warp_into(self, target: moderngl.Framebuffer, corner: int, tile: tuple[int, int], viewpoint: Point) -> None:
+    def _warp_into(
+        self, target: moderngl.Framebuffer, corner: int, tile: tuple[int, int], viewpoint: Point, tone: str
+    ) -> None:
         pictures = self._at_hand
+        self._carry_disparity(viewpoint)
         target.viewport = (*tile, *pictures.size)
         target.use()
-        self._warped.render(
+        self._pass("warped.frag", tone=tone).render(
             {"corner_views": pictures.corner_views, "disparity": pictures.disparity},
             {"viewpoint": viewpoint, "corner": corner, "tile": tile},
         )
@@ -295,10 +370,6 @@ def standalone_context() -> moderngl.Context:
 
 def _shown_size(size: Size, look: Look) -> Size:
     return (2 * size[0], 2 * size[1]) if look is Look.WARPED_ALL else size
-
-
-def _shows_captured(frame: Frame) -> bool:
-    return frame.captured and frame.look is Look.SYNTHESIS
 
 
 def _sampling(scale: float) -> str:
@@ -353,35 +424,59 @@ class _Pass:
         member.value = value
 
 
+class _Picture:
+    """A texture that a pass draws into, and what it was last drawn for."""
+
+    def __init__(self, context: moderngl.Context, size: Size, dtype: str, owner: _Pictures) -> None:
+        self.texture = _texture(context, size, 4, dtype)
+        self.target = context.framebuffer([self.texture])
+        self._owner = owner
+
+    def outdated(self, *made_for: object) -> bool:
+        """Whether the picture was last made for something else; it counts as made for this from now on."""
+        return self._owner.outdated(self, *made_for)
+
+    @property
+    def made_for(self) -> tuple[object, ...]:
+        """What it was last made for."""
+        return self._owner.current.get(self, ())
+
+    def release(self) -> None:
+        """Give the memory of the graphics back."""
+        self.target.release()
+        self.texture.release()
+
+
 class _Pictures:
     """The textures of one light field, and the framebuffers of the passes at its size."""
 
-    def __init__(self, context: moderngl.Context, corners: npt.NDArray[np.generic]) -> None:
+    def __init__(self, context: moderngl.Context, corners: npt.NDArray[np.generic], picture_type: str) -> None:
         height, width = corners.shape[1:3]
         stored = _TEXTURE_TYPES[corners.dtype.name]
         self.size: Size = (width, height)
         self.corner_views = context.texture_array(
             (width, height, len(CORNERS)), 3, np.ascontiguousarray(corners).tobytes(), alignment=1, dtype=stored
         )
-        self.captured = _texture(context, self.size, 3, stored)
-        self.image = _texture(context, self.size, 3, "f4")
+        self.captured = context.texture_array((width, height, 1), 3, alignment=1, dtype=stored)
+        self.exact = context.texture_array((width, height, 1), 3, alignment=1, dtype="f4")  # the newest synthesis
+        self.syntheses = context.texture_array((width, height, 2), 4)  # the newest one and the one before, in 8 bits
+        self.newest = 0  # layer of `syntheses`
+        self.newest_at: Point | None = None  # viewpoint of the newest synthesis
+        self.older_at: Point | None = None
         self.disparity_map = _texture(context, self.size, 1, "f4")
-        self.disparity = _texture(context, self.size, 1, "f4")
-        self.instant = _texture(context, self.size, 4, "f4")
-        self.faded = _texture(context, self.size, 4, "f4")
-        self.warped = _texture(context, self.size, 4, "f4")
-        self.sheet = _texture(context, (2 * width, 2 * height), 4, "f4")
-        self.disparity_target = context.framebuffer([self.disparity])
-        self.instant_target = context.framebuffer([self.instant])
-        self.faded_target = context.framebuffer([self.faded])
-        self.warped_target = context.framebuffer([self.warped])
-        self.sheet_target = context.framebuffer([self.sheet])
         self.made_at: Point | None = None  # viewpoint of disparity_map
         self.nearest_disparity = 0.0
+        self.disparity = _texture(context, self.size, 1, "f4")
+        self.disparity_target = context.framebuffer([self.disparity])
+        self.before = _Picture(context, self.size, picture_type, self)
+        self.after = _Picture(context, self.size, picture_type, self)
+        self.picture = _Picture(context, self.size, picture_type, self)
+        self.sheet = _Picture(context, (2 * width, 2 * height), picture_type, self)
+        self.precise = _Picture(context, self.size, "f4", self)
         self.made = 0  # how often a target was made
-        self.current: dict[str, tuple[object, ...]] = {}  # what each target was last made for
+        self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
 
-    def outdated(self, target: str, *made_for: object) -> bool:
+    def outdated(self, target: object, *made_for: object) -> bool:
         """Whether the target was last made for something else; it counts as made for this from now on."""
         if self.current.get(target) == made_for:
             return False
@@ -392,7 +487,7 @@ class _Pictures:
     def release(self) -> None:
         """Give the memory of the graphics back."""
         for value in vars(self).values():
-            if isinstance(value, moderngl.Framebuffer | moderngl.Texture | moderngl.TextureArray):
+            if isinstance(value, moderngl.Framebuffer | moderngl.Texture | moderngl.TextureArray | _Picture):
                 value.release()
 
 

@@ -9,26 +9,54 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 from app.engine import Answer, Engine, disparity_range
-from app.state import Grid, Look, Point, Readout, Step, ViewState
-from app.worker import Cancel, Done, LatestWorker
+from app.foresight import captured_viewpoints, heading, viewpoints_ahead
+from app.state import Grid, Look, Point, Readout, Step, ViewState, carried_share
+from app.worker import Cancel, Done, Job, LatestWorker
+from lfcore.cache import rounded
 from lfcore.errors import Cancelled
 from lfcore.lightfield import LightField
 
 Progress = Callable[[float], None]
 OpenLightField = Callable[[Path, Progress, Cancel], LightField]
 
-REST_SECONDS = 0.12  # the hand counts as resting when the viewpoint has not moved for so long
-FADE_SECONDS = 0.12
+REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
+FADE_SECONDS = 0.1
+STREAM_FADE_SECONDS = 0.06  # while the hand moves, when one synthesis follows the other
+QUIET_SECONDS = 0.6  # after the last thing that the person did, views are computed ahead
+# A synthesis for a viewpoint that the hand has left is of use as long as it is not much farther off than the one at hand.
+_FARTHER = 0.02
 # A dragged viewpoint that comes to rest this near to a captured or a cached one goes there: no pixel of an ordinary light
 # field moves visibly by it, and the camera's view or the finished picture is there at once.
 MAGNET_RADIUS = 0.012
 PROGRESS_SECONDS = 0.15
 STOP_SECONDS = 10.0
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
-SYNTHESIS_NICENESS = 2
+# It sleeps for a part of every sixtieth of a second, which is then theirs, so this takes nothing from them.
+SYNTHESIS_NICENESS = 5
+
+
+class _Task(Enum):
+    """What the synthesis thread can be asked for."""
+
+    QUICK = "the viewpoint, by the model for a hand that moves"
+    FINAL = "the viewpoint, by the model for a hand at rest"
+    SAVE = "writing a view to disk"
+    FETCH = "bringing a view from disk"
+    AHEAD = "a viewpoint that may be wanted next"
+
+
+_FOR_NOW = (_Task.QUICK, _Task.FINAL)
+
+
+@dataclass(frozen=True)
+class _Wish:
+    task: _Task
+    at: Point
 
 
 class Controller:
@@ -37,29 +65,33 @@ class Controller:
     def __init__(self, engine: Engine, open_light_field: OpenLightField, wake: Callable[[], None], model: str) -> None:
         self.state = ViewState()
         self.light_field: LightField | None = None
-        self.newest: Answer | None = None  # whose disparity map carries the instant step
-        self.picture: Answer | None = None  # the synthesis for exactly the viewpoint on screen
+        self.newest: Answer | None = None  # what is on screen, carried by its disparity map to the viewpoint
+        self.picture: Answer | None = None  # the same, where it was made for exactly the viewpoint on screen
         self.messages: list[str] = []
         self._engine = engine
         self._open_light_field = open_light_field
         self._model = model
         self._wake = wake
         self._loader: LatestWorker[LightField] = LatestWorker("loader", wake)
-        self._synthesis: LatestWorker[Answer] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
+        self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
         self._loading: Path | None = None
         self._load_ticket = 0
         self._loaded_share = 0.0
         self._grid: Grid | None = None
-        self._asked: Point | None = None  # viewpoint of the latest query
+        self._wish: _Wish | None = None  # the latest query
         self._ticket = 0  # of the latest query
         self._first_ticket = 0  # of the first query about this light field
+        self._next: Answer | None = None  # has come while the one before is still being faded in
         self._shown: Point | None = None  # viewpoint at the last tick
+        self._heading: Point = (0.0, 0.0)
         self._moved_at = -math.inf
-        self._faded_in_at = -math.inf
+        self._acted_at = -math.inf
+        self._acted = False
+        self._fade_from, self._fade_seconds = -math.inf, FADE_SECONDS
         self._now = 0.0
-        self._cached: tuple[Point, ...] = ()
+        self._cached: dict[Point, None] = {}  # viewpoints in memory, the one used longest ago first
+        self._faulted = False  # the last query failed, and the viewpoint has not moved since
         self._hits = 0
-        self._from_cache = False
 
     # What the person asks for.
 
@@ -113,6 +145,13 @@ class Controller:
         if self.messages:
             self.messages.pop(0)
 
+    def touch(self) -> None:
+        """The person does something: whatever is being computed ahead stops at once."""
+        self._acted = True
+        if self._wish is not None and self._wish.task is _Task.AHEAD:
+            self._synthesis.cancel_all()
+            self._wish = None
+
     def stop(self) -> None:
         """End the threads, waiting a little for work that cannot be broken off at once."""
         self._loader.stop(STOP_SECONDS)
@@ -123,17 +162,21 @@ class Controller:
     def tick(self, now: float) -> None:
         """Take what the workers have finished, and ask them for what is wanted next. `now` in seconds."""
         self._now = now
+        if self._acted:
+            self._acted, self._acted_at = False, now
         self._collect()
         if self.light_field is None:
             return
         if self._shown != self.viewpoint:
-            self._moved_at = now
-            self._look_up(self.light_field)
+            self._follow(self.light_field)
         if self._resting and self.state.hand is not None:
             self._magnet(self.light_field)
             if not self.state.dragging:
                 self.state.hand = None
         self._shown = self.viewpoint
+        if self._next is not None and self.share >= 1.0:
+            answer, self._next = self._next, None
+            self._accept(answer)
         self._ask(self.light_field)
 
     @property
@@ -142,19 +185,21 @@ class Controller:
         return self.state.u, self.state.v
 
     @property
-    def full_share(self) -> float:
-        """How far the synthesis of this viewpoint has been faded in: 0 where there is none."""
-        if self.picture is None:
-            return 0.0
-        return min(max((self._now - self._faded_in_at) / FADE_SECONDS, 0.0), 1.0)
+    def share(self) -> float:
+        """How far the newest synthesis has been faded in over what was on screen before it."""
+        return min(max((self._now - self._fade_from) / self._fade_seconds, 0.0), 1.0)
 
     @property
     def next_frame_in(self) -> float | None:
         """Seconds until something changes by itself (0: animating), or None where only an event or a worker changes it."""
-        if self.picture is not None and self.full_share < 1.0:
+        if self.newest is not None and self.share < 1.0:
             return 0.0
-        if self.light_field is not None and not self._resting:
+        if self.light_field is None:
+            return None
+        if not self._resting:
             return max(self._moved_at + REST_SECONDS - self._now, 0.0) + 1e-3
+        if not self._quiet and self.state.foresight:
+            return max(self._acted_at, self._moved_at) + QUIET_SECONDS - self._now + 1e-3
         return None
 
     @property
@@ -163,8 +208,11 @@ class Controller:
         if self._shows_captured:
             return Step.CAPTURED
         if self.picture is not None:
-            return Step.FULL
-        return Step.INSTANT if self._newest_disparity else Step.BLEND
+            return self.picture.step
+        if self.newest is None or not self._newest_disparity:
+            return Step.BLEND
+        carried = carried_share(math.dist(_viewpoint_of(self.newest), self.viewpoint))
+        return Step.REALTIME if self.newest.step is Step.REALTIME and carried >= 0.5 else Step.INSTANT
 
     @property
     def captured_here(self) -> int | None:
@@ -194,7 +242,7 @@ class Controller:
             facts=tuple(light_field.facts.items()) if light_field else (),
             step=self.step,
             step_ms=self._step_ms(instant_ms),
-            from_cache=self._from_cache and self.step is Step.FULL,
+            from_cache=answer is not None and answer.kept and self.step is answer.step,
             busy=self._busy(),
             loading=self._loaded_share if self._loading is not None else None,
             loading_name=self._loading.name if self._loading is not None else "",
@@ -205,7 +253,7 @@ class Controller:
             has_disparity=self._newest_disparity,
             disparity_under_cursor=self._disparity_under_cursor(),
             captured_here=self.captured_here,
-            cached=self._cached,
+            cached=tuple(self._cached),
             cache_bytes=self._engine.cache.bytes_used,
             cache_limit=self._engine.cache.limit_bytes,
             cache_hits=self._hits,
@@ -218,6 +266,10 @@ class Controller:
         return self._now - self._moved_at >= REST_SECONDS
 
     @property
+    def _quiet(self) -> bool:
+        return self._now - max(self._acted_at, self._moved_at) >= QUIET_SECONDS
+
+    @property
     def _shows_captured(self) -> bool:
         return self.state.captured and self.state.look is Look.SYNTHESIS and self.captured_here is not None
 
@@ -227,11 +279,13 @@ class Controller:
 
     def _take(self, light_field: LightField | None) -> None:
         self.light_field = light_field
-        self.newest = self.picture = None
-        self._asked = self._shown = None
+        self.newest = self.picture = self._next = None
+        self._wish = self._shown = None
+        self._heading = (0.0, 0.0)
         self._first_ticket = self._ticket + 1
         self._grid = None
-        self._cached = ()
+        self._cached = {}
+        self._faulted = False
         self.state.hand = None
         self.state.zoom = ViewState().zoom
         self.state.cursor = None
@@ -239,7 +293,7 @@ class Controller:
         if light_field is not None:
             size = (light_field.rows, light_field.columns, light_field.width, light_field.height)
             self._grid = Grid(*size, light_field.dark)
-            self._cached = self._engine.cached_positions(light_field)
+            self._cached = dict.fromkeys(self._engine.cached_positions(light_field))
 
     def _collect(self) -> None:
         while not self._loader.outcomes.empty():
@@ -256,40 +310,116 @@ class Controller:
             answered = self._synthesis.outcomes.get()
             if not isinstance(answered, Done):
                 self.say(answered.message)
-            elif answered.ticket >= self._first_ticket:
-                self._accept(answered.value)
+                self._faulted = True
+            elif answered.ticket >= self._first_ticket and self.light_field is not None:
+                self._cached = dict.fromkeys(self._engine.cached_positions(self.light_field))
+                if answered.value is not None:
+                    self._accept(answered.value)
 
     def _accept(self, answer: Answer) -> None:
+        """Show an answer, unless something better is on screen, once what is there has been faded in."""
+        here = self.viewpoint
+        exact = _viewpoint_of(answer) == here
+        if self.picture is not None and (not exact or (self.picture.final and not answer.final)):
+            return
+        if self.newest is not None and not exact:
+            distance = math.dist(_viewpoint_of(self.newest), here)
+            if math.dist(_viewpoint_of(answer), here) > distance + _FARTHER:
+                return
+        if self.newest is not None and self.share < 1.0:
+            self._next = answer
+            return
+        if self.picture is None or not self.picture.final:  # otherwise it is the same synthesis, now with its score
+            self._fade_from = self._now
+            self._fade_seconds = FADE_SECONDS if self._resting else STREAM_FADE_SECONDS
         self.newest = answer
-        if (answer.synthesis.u, answer.synthesis.v) == self.viewpoint:
-            if self.picture is None:
-                self._faded_in_at = self._now
+        if exact:
             self.picture = answer
-        if self.light_field is not None:
-            self._cached = self._engine.cached_positions(self.light_field)
+
+    def _follow(self, light_field: LightField) -> None:
+        """The viewpoint has moved."""
+        self._moved_at = self._now
+        self._faulted = False
+        if self._shown is not None:
+            here = self.viewpoint
+            self._heading = heading(self._heading, (here[0] - self._shown[0], here[1] - self._shown[1]))
+        self._look_up(light_field)
 
     def _look_up(self, light_field: LightField) -> None:
         """A viewpoint seen before is on screen at once, without a fade."""
         self.picture = self._engine.cached(light_field, *self.viewpoint)
-        self._from_cache = self.picture is not None
         if self.picture is not None:
-            self.newest = self.picture
-            self._faded_in_at = -math.inf
+            self.newest, self._next = self.picture, None
+            self._fade_from = -math.inf
             self._hits += 1
+        elif self.newest is not None and _viewpoint_of(self.newest) == self.viewpoint:
+            self.picture = self.newest
 
     def _ask(self, light_field: LightField) -> None:
-        """Query the viewpoint on screen. A query that runs for another goes on while the hand moves, since its disparity
-        map serves the instant step, and is given up when the hand rests."""
-        wanted = self.viewpoint
-        have_all = self.picture is not None and (self.picture.score is not None or self.captured_here is None)
-        if self._asked != wanted and not self._engine.failed:
-            self._asked = wanted
-            if have_all:
+        """Give the synthesis thread what is wanted most, and break off what is not.
+
+        Where there is a model for a hand that moves, anything else gives way to it at once. Where there is none, a query
+        that runs for another viewpoint goes on while the hand moves, since it serves to be carried, and is given up when
+        the hand rests.
+        """
+        wish = self._wanted(light_field)
+        if wish != self._wish:
+            before, self._wish = self._wish, wish
+            if wish is None:
+                self._synthesis.cancel_all()
                 return
-            self._ticket = self._synthesis.submit(lambda cancelled: self._engine.answer(light_field, *wanted, cancelled))
+            self._ticket = self._synthesis.submit(self._job(light_field, wish))
+            if before is not None and before.task is not _Task.QUICK and (self._engine.quick or before.task is _Task.AHEAD):
+                self._synthesis.cancel_before(self._ticket)
         running = self._synthesis.running
-        if self._resting and running is not None and running < self._ticket and self._newest_disparity:
+        useless = self._resting and self._newest_disparity
+        if useless and running is not None and running < self._ticket and not self._engine.quick:
             self._synthesis.cancel_before(self._ticket)
+
+    def _wanted(self, light_field: LightField) -> _Wish | None:
+        if self._engine.failed:
+            return None
+        here, picture = self.viewpoint, self.picture
+        if picture is None or not picture.final or (picture.score is None and self.captured_here is not None):
+            moving = not self._resting or (self.newest is None and not self._faulted)
+            if self._engine.quick and moving and (picture is None or not picture.final):
+                return _Wish(_Task.QUICK, here) if picture is None else None
+            return _Wish(_Task.FINAL, here)
+        return self._wanted_later(light_field) if self._resting else None
+
+    def _wanted_later(self, light_field: LightField) -> _Wish | None:
+        """What there is to do while the hand rests on a finished picture."""
+        engine = self._engine
+        unsaved = engine.unsaved
+        if unsaved is not None:
+            return _Wish(_Task.SAVE, unsaved)
+        stored = engine.stored_position(light_field)
+        if stored is not None:
+            return _Wish(_Task.FETCH, stored)
+        if not self.state.foresight or not self._quiet or self._grid is None or not engine.has_room(light_field):
+            return None
+        for point in viewpoints_ahead(self.viewpoint, self._heading, self._grid):
+            if rounded(*point) not in self._cached:
+                return _Wish(_Task.AHEAD, point)
+        return None
+
+    def _job(self, light_field: LightField, wish: _Wish) -> Job[Answer | None]:
+        engine, (u, v) = self._engine, wish.at
+
+        def job(cancelled: Cancel) -> Answer | None:
+            if wish.task is _Task.QUICK:
+                return engine.quick_answer(light_field, u, v, cancelled)
+            if wish.task is _Task.FINAL:
+                return engine.answer(light_field, u, v, cancelled)
+            if wish.task is _Task.SAVE:
+                engine.save_one()
+            elif wish.task is _Task.FETCH:
+                engine.fetch(light_field, u, v)
+            else:
+                engine.answer(light_field, u, v, cancelled)
+            return None
+
+        return job
 
     def _magnet(self, light_field: LightField) -> None:
         assert self._grid is not None
@@ -312,9 +442,15 @@ class Controller:
         return instant_ms
 
     def _busy(self) -> str:
-        if self._engine.failed or not self._synthesis.busy:
+        if self._engine.failed or self._wish is None or not self._synthesis.busy:
             return ""
-        return "synthesizing" if self._engine.ready else "loading the networks"
+        if self._wish.task in _FOR_NOW:
+            return "synthesizing" if self.newest is not None or self._engine.ready else "loading the networks"
+        if self._wish.task is _Task.AHEAD and self._grid is not None:
+            captured = captured_viewpoints(self._grid)
+            done = sum(rounded(*point) in self._cached for point in captured)
+            return f"computing ahead, {done} of {len(captured)}"
+        return ""
 
     def _disparity_under_cursor(self) -> float | None:
         if self.picture is None or self.picture.synthesis.disparity is None or self.state.cursor is None:
@@ -324,3 +460,7 @@ class Controller:
         if not (0 <= y < disparity.shape[0] and 0 <= x < disparity.shape[1]):
             return None
         return float(disparity[y, x])
+
+
+def _viewpoint_of(answer: Answer) -> Point:
+    return answer.synthesis.u, answer.synthesis.v

@@ -1,111 +1,242 @@
-"""What the synthesis thread does with one query: the synthesizer, its cache and the score against the captured view.
+"""What the synthesis thread does with one query: the models, the caches in memory and on disk, the score.
 
 torch is imported here when the first query runs, in that thread, so that the window is up before.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
-from app.state import ScoreText
+from app.state import Point, ScoreText, Step
 from app.worker import Cancel
-from lfcore.cache import CacheKey, SynthesisCache, cache_key
-from lfcore.errors import LfviewError
+from lfcore.cache import CacheKey, SynthesisCache, cache_key, held_bytes
+from lfcore.errors import LfviewError, OutputError
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import K16_CROP, k16, psnr, ssim, to_uint8
+from lfcore.store import ViewStore
 
 if TYPE_CHECKING:
     from lfcore.synthesizer import Synthesis, Synthesizer
 
+MakeSynthesizer = Callable[[], "Synthesizer"]
+
 PERCENTILES = tuple(range(101))
 _PERCENTILE_STRIDE = 3  # every third row and column tell a range well enough, in a tenth of the time
 SCORES_KEPT = 4096
+_NAME_OF_SMALL_NETWORKS = "realtime"
+_ROOM_LEFT = 0.1  # of the memory cache, for what the hand itself asks for
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The synthesis of one viewpoint and what the panels print about it."""
+    """The synthesis of one viewpoint and what the canvas and the panels want to know about it."""
 
     synthesis: Synthesis
-    score: ScoreText | None  # None where (u, v) is on no captured view
+    pixels: npt.NDArray[np.uint8]  # (H, W, 4), the synthesized image in 8 bits
+    step: Step
+    final: bool  # made by the model for a hand at rest
+    kept: bool  # was in memory or on disk already
+    score: ScoreText | None  # None where (u, v) is on no captured view, or not final
     percentiles: tuple[float, ...] | None  # of the disparity in px over the baseline, 0 to 100
 
 
-class Engine:
-    """Answers queries. `answer` belongs to one worker thread; `cached` may be called from any."""
+class _Model:
+    """A synthesizer that is made when first needed, and takes over a light field when it is another than the last."""
 
-    def __init__(self, make_synthesizer: Callable[[], Synthesizer], cache_bytes: int) -> None:
-        self._make_synthesizer = make_synthesizer
-        self._synthesizer: Synthesizer | None = None
-        self._failure: LfviewError | None = None
+    def __init__(self, make: MakeSynthesizer) -> None:
+        self._make = make
         self._light_field: LightField | None = None
-        self._scores: dict[CacheKey, ScoreText] = {}
+        self.synthesizer: Synthesizer | None = None
+        self.failure: LfviewError | None = None
+
+    def prepare(self) -> Synthesizer:
+        """Load the model, where that has not been done; raises the same error each time where it cannot be done."""
+        if self.failure is not None:
+            raise self.failure
+        if self.synthesizer is None:
+            try:
+                self.synthesizer = self._make()
+            except LfviewError as error:
+                self.failure = error
+                raise
+        return self.synthesizer
+
+    def synthesize(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Synthesis:
+        synthesizer = self.prepare()
+        if self._light_field is not light_field:
+            synthesizer.set_light_field(light_field)
+            self._light_field = light_field
+        return synthesizer.synthesize(u, v, cancelled)
+
+
+class Engine:
+    """Answers queries. What computes or reads belongs to one worker thread; the properties, `cached`, `cached_positions` and
+    `stored_position` may be used from any.
+
+    `make_synthesizer`: the model for a hand at rest. `make_quick`: a faster one for a hand that moves; without it the first
+    serves both. `store`: where views of the first are kept on disk.
+    """
+
+    def __init__(
+        self,
+        make_synthesizer: MakeSynthesizer,
+        cache_bytes: int,
+        make_quick: MakeSynthesizer | None = None,
+        store: ViewStore | None = None,
+    ) -> None:
         self.cache = SynthesisCache(cache_bytes)
+        self._final = _Model(make_synthesizer)
+        self._quick = _Model(make_quick) if make_quick is not None else None
+        self._store = store
+        self._tidied = False
+        self._stored_of: LightField | None = None
+        self._stored: frozenset[Point] = frozenset()  # viewpoints on disk, of that light field
+        self._unsaved: dict[CacheKey, None] = {}  # in the order in which they came
+        self._scores: dict[CacheKey, ScoreText] = {}
 
     @property
     def ready(self) -> bool:
-        """Whether the model has been loaded."""
-        return self._synthesizer is not None
+        """Whether the model for a hand at rest has been loaded."""
+        return self._final.synthesizer is not None
 
     @property
     def failed(self) -> bool:
-        """Whether the model could not be loaded; it is not tried again."""
-        return self._failure is not None
+        """Whether that model could not be loaded; it is not tried again."""
+        return self._final.failure is not None
 
-    def prepare(self) -> None:
-        """Load the model, where that has not been done; raises the same error each time where it cannot be done."""
-        if self._failure is not None:
-            raise self._failure
-        if self._synthesizer is None:
-            try:
-                self._synthesizer = self._make_synthesizer()
-            except LfviewError as error:
-                self._failure = error
-                raise
+    @property
+    def quick(self) -> bool:
+        """Whether there is a model for a hand that moves."""
+        return self._quick is not None and self._quick.failure is None
+
+    def quick_answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
+        """The synthesis of (u, v) by the model for a hand that moves. It is not kept: making it again is quick."""
+        assert self._quick is not None
+        return _answer(self._quick.synthesize(light_field, u, v, cancelled), final=False, kept=False, score=None)
 
     def answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
-        """The synthesis of (u, v), from the cache or by the networks, with its score. Runs in the worker thread."""
+        """The synthesis of (u, v), from memory, from disk or by the model, with its score."""
         known = self.cached(light_field, u, v)
         if known is not None and (known.score is not None or light_field.at(u, v) is None):
             return known
-        self.prepare()
-        assert self._synthesizer is not None
-        key = cache_key(light_field, self._synthesizer, u, v)
-        synthesis = known.synthesis if known is not None else self._synthesize(light_field, u, v, cancelled)
+        synthesizer = self._final.prepare()
+        key = cache_key(light_field, synthesizer, u, v)
+        synthesis = known.synthesis if known is not None else self._from_disk(light_field, key, u, v)
+        kept = synthesis is not None
+        if synthesis is None:
+            synthesis = self._final.synthesize(light_field, u, v, cancelled)
+            if self._store is not None:
+                self._unsaved[key] = None
         self.cache.put(key, synthesis)
         score = _score(light_field, synthesis)
         if score is not None:
             if len(self._scores) >= SCORES_KEPT:
                 self._scores.pop(next(iter(self._scores)))
             self._scores[key] = score
-        return Answer(synthesis, score, _percentiles(synthesis.disparity))
+        return _answer(synthesis, final=True, kept=kept, score=score)
 
     def cached(self, light_field: LightField, u: float, v: float) -> Answer | None:
-        """The answer for (u, v) if its synthesis is in the cache; quick enough for the frame loop."""
-        if self._synthesizer is None:
+        """The answer for (u, v) if its synthesis is in memory; quick enough for the frame loop."""
+        synthesizer = self._final.synthesizer
+        if synthesizer is None:
             return None
-        key = cache_key(light_field, self._synthesizer, u, v)
+        key = cache_key(light_field, synthesizer, u, v)
         synthesis = self.cache.get(key)
         if synthesis is None:
             return None
-        return Answer(synthesis, self._scores.get(key), _percentiles(synthesis.disparity))
+        return _answer(dataclasses.replace(synthesis, u=u, v=v), final=True, kept=True, score=self._scores.get(key))
 
-    def cached_positions(self, light_field: LightField) -> tuple[tuple[float, float], ...]:
-        """The viewpoints of this light field that are in the cache."""
-        if self._synthesizer is None:
+    def cached_positions(self, light_field: LightField) -> tuple[Point, ...]:
+        """The viewpoints of this light field that are in memory."""
+        synthesizer = self._final.synthesizer
+        if synthesizer is None:
             return ()
-        return tuple(self.cache.positions(light_field.content_key, self._synthesizer.key))
+        return tuple(self.cache.positions(light_field.content_key, synthesizer.key))
 
-    def _synthesize(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Synthesis:
-        assert self._synthesizer is not None
-        if self._light_field is not light_field:
-            self._synthesizer.set_light_field(light_field)
-            self._light_field = light_field
-        return self._synthesizer.synthesize(u, v, cancelled)
+    # What is done while nothing is asked.
+
+    @property
+    def unsaved(self) -> Point | None:
+        """The viewpoint of a view that is to be written to disk, or None."""
+        key = next(iter(tuple(self._unsaved)), None)
+        return None if key is None else (key.u, key.v)
+
+    def save_one(self) -> None:
+        """Write a view to disk. Raises OutputError once, and then goes on without the disk."""
+        if self._store is None or not self._unsaved:
+            return
+        key = next(iter(self._unsaved))
+        del self._unsaved[key]
+        synthesis = self.cache.get(key)
+        if synthesis is None:
+            return
+        try:
+            self._store.put(key, synthesis)
+            if self._stored_of is not None and self._stored_of.content_key == key.content:
+                self._stored |= {(key.u, key.v)}
+        except OutputError as error:
+            self._store = None
+            self._stored = frozenset()
+            self._unsaved.clear()
+            raise OutputError(f"Synthesized views are not kept on disk from now on: {error}") from error
+
+    def stored_position(self, light_field: LightField) -> Point | None:
+        """A viewpoint of this light field that is on disk, not in memory, and for which there is room there, or None."""
+        if self._stored_of is not light_field or not self.has_room(light_field):
+            return None
+        return next(iter(self._stored.difference(self.cached_positions(light_field))), None)
+
+    def fetch(self, light_field: LightField, u: float, v: float) -> None:
+        """Bring a view from disk into memory."""
+        synthesizer = self._final.prepare()
+        key = cache_key(light_field, synthesizer, u, v)
+        synthesis = self._from_disk(light_field, key, u, v)
+        if synthesis is not None:
+            self.cache.put(key, synthesis)
+
+    def has_room(self, light_field: LightField) -> bool:
+        """Whether memory holds another view of this light field without driving one out."""
+        wanted = held_bytes(light_field.height, light_field.width)
+        return self.cache.bytes_used + wanted <= (1 - _ROOM_LEFT) * self.cache.limit_bytes
+
+    def _from_disk(self, light_field: LightField, key: CacheKey, u: float, v: float) -> Synthesis | None:
+        if self._store is None:
+            return None
+        if self._stored_of is not light_field:
+            self._list_stored(light_field, key)
+        if (key.u, key.v) not in self._stored:
+            return None
+        synthesis = self._store.get(key, (light_field.height, light_field.width))
+        if synthesis is None:
+            self._stored -= {(key.u, key.v)}  # damaged, or removed by another program
+            return None
+        return dataclasses.replace(synthesis, u=u, v=v)
+
+    def _list_stored(self, light_field: LightField, key: CacheKey) -> None:
+        assert self._store is not None
+        if not self._tidied:
+            self._tidied = True
+            self._store.tidy()
+        self._stored = frozenset(self._store.positions(key.content, key.model))
+        self._stored_of = light_field
+
+
+def _answer(synthesis: Synthesis, *, final: bool, kept: bool, score: ScoreText | None) -> Answer:
+    step = Step.REALTIME if synthesis.model == _NAME_OF_SMALL_NETWORKS else Step.FULL
+    return Answer(synthesis, _pixels(synthesis.image), step, final, kept, score, _percentiles(synthesis.disparity))
+
+
+def _pixels(image: FloatArray) -> npt.NDArray[np.uint8]:
+    pixels = np.empty((*image.shape[:2], 4), np.uint8)
+    pixels[..., :3] = to_uint8(image)
+    pixels[..., 3] = 255
+    return pixels
 
 
 def _score(light_field: LightField, synthesis: Synthesis) -> ScoreText | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -16,13 +15,14 @@ from app.commands import Action, OpenPath, Request
 from app.controller import Controller
 from app.engine import Answer
 from app.layout import Layout
-from app.state import Look, Placement, Rect, place
+from app.state import Look, Placement, Rect, Step, place
 from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.lightfield import CORNERS, LightField
 
 GLSL_VERSION = "#version 330 core"
 DIMMED = 0.35
+PANEL = (theme.PANEL.x, theme.PANEL.y, theme.PANEL.z)
 
 
 class Interface:
@@ -37,6 +37,8 @@ class Interface:
         self._light_field: LightField | None = None  # what the canvas has taken
         self._answer: Answer | None = None
         self._captured: int | None = None
+        self._timer = self._canvas.timer()
+        self._timed = False  # a picture was made in the last frame
         self._picture_ms: float | None = None
         imgui.backends.opengl3_init(GLSL_VERSION)
 
@@ -62,9 +64,11 @@ class Interface:
             self._fulfil(request)
         self.controller.tick(now)
         self._synchronise()
-        self._canvas.begin(target)
+        pixels = target.size[0] / max(display.x, 1.0)
+        grounds = [area for area in (layout.panel, layout.status) if area is not None]
+        self._canvas.begin(target, [(_scaled(area, pixels), PANEL) for area in grounds])
         if self._light_field is not None:
-            self._draw_picture(target, layout, target.size[0] / max(display.x, 1.0))
+            self._draw_picture(target, layout, pixels)
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
@@ -110,7 +114,7 @@ class Interface:
         answer = controller.newest
         if answer is not None and answer is not self._answer:
             synthesis = answer.synthesis
-            canvas.set_synthesis(synthesis.image, synthesis.disparity, (synthesis.u, synthesis.v))
+            canvas.set_synthesis(synthesis.image, answer.pixels, synthesis.disparity, (synthesis.u, synthesis.v))
             self._answer = answer
         captured = controller.captured_here
         if captured is not None and captured != self._captured:
@@ -119,19 +123,15 @@ class Interface:
 
     def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
         """`pixels`: framebuffer pixels per window unit."""
+        if self._timed:  # asked one frame later, when the graphics have done it, so that nothing waits
+            self._picture_ms = 1e-6 * self._timer.elapsed
         frame = self._frame()
-        start = time.perf_counter()
-        if self._canvas.prepare(frame):
-            self._canvas.finish()
-            self._picture_ms = 1e3 * (time.perf_counter() - start)
+        with self._timer:
+            self._timed = self._canvas.prepare(frame)
         area = layout.picture
         placement = place(self.controller.state.zoom, self._canvas.picture_size(frame.look), area)
-        self._canvas.draw(
-            frame,
-            target,
-            Rect(area.x * pixels, area.y * pixels, area.width * pixels, area.height * pixels),
-            Placement(placement.scale * pixels, (placement.origin[0] * pixels, placement.origin[1] * pixels)),
-        )
+        origin = (placement.origin[0] * pixels, placement.origin[1] * pixels)
+        self._canvas.draw(frame, target, _scaled(area, pixels), Placement(placement.scale * pixels, origin))
 
     def _frame(self) -> Frame:
         """What the picture is to show; dimmed where the chosen look has nothing to show here."""
@@ -145,13 +145,18 @@ class Interface:
         return Frame(
             look,
             controller.viewpoint,
-            full_share=controller.full_share,
-            captured=state.captured and controller.captured_here is not None,
+            share=controller.share,
+            captured=controller.step is Step.CAPTURED,
             display_tone=state.display_tone,
             gain=state.gain,
             disparity_range=controller.disparity_range or (0.0, 1.0),
             dim=dim,
         )
+
+
+def _scaled(area: Rect, pixels: float) -> Rect:
+    """From window units to framebuffer pixels."""
+    return Rect(area.x * pixels, area.y * pixels, area.width * pixels, area.height * pixels)
 
 
 def path_from_text(text: str) -> Path:

@@ -14,7 +14,7 @@ WHEEL_STEP = 1.2
 
 def draw(area: Rect, state: ViewState, picture: Size, scale: float) -> None:
     """The invisible window over the picture that takes the mouse."""
-    flags = FIXED | imgui.WindowFlags_.no_background.value | imgui.WindowFlags_.no_scroll_with_mouse.value
+    flags = FIXED | imgui.WindowFlags_.no_scroll_with_mouse.value
     with window("picture", area, flags, padding=ImVec2(0, 0)):
         buttons = (
             imgui.ButtonFlags_.mouse_button_left.value

@@ -52,16 +52,27 @@ class Step(Enum):
 
     BLEND = "blend"
     INSTANT = "instant"
+    REALTIME = "realtime"
     FULL = "full"
     CAPTURED = "captured"
 
 
 STEP_MEANING = {
     Step.BLEND: "the four corner views averaged by nearness, until the first disparity map is there",
-    Step.INSTANT: "the four corner views warped by the newest disparity map and blended, on every frame",
+    Step.INSTANT: "the newest synthesis, or the four corner views, warped by the newest disparity map, on every frame",
+    Step.REALTIME: "the newest synthesis by the small networks, carried the rest of the way to where the hand is by now",
     Step.FULL: "the synthesis by the networks for exactly this viewpoint",
     Step.CAPTURED: "the camera's own view",
 }
+
+# A synthesis is carried by its disparity to viewpoints this near (of the baseline) as it is, and up to the second distance
+# ever more mixed with the warped corner views, which know what it has not seen.
+CARRIED_NEAR, CARRIED_FAR = 0.1, 0.2
+
+
+def carried_share(distance: float) -> float:
+    """Share of a synthesis, carried over this distance, in the picture on screen; the rest is that of the corner views."""
+    return min(max((CARRIED_FAR - distance) / (CARRIED_FAR - CARRIED_NEAR), 0.0), 1.0)
 
 
 @dataclass(frozen=True)
@@ -189,6 +200,7 @@ class ViewState:
     zoom: Zoom = field(default_factory=Zoom)
     gain: float = 8.0  # of the error look
     tail: float = 1.0  # per cent of the disparity values left out at either end of the colour range
+    foresight: bool = True  # compute views that may be wanted next while nothing else is to be done
     panel: bool = True
     help: bool = False
     path_field: bool = False

@@ -13,6 +13,7 @@ from app.widgets import em, milliseconds, number, packed, text, tooltip, window
 STEP_COLOURS = {
     Step.BLEND: theme.TEXT_FAINT,
     Step.INSTANT: theme.WARNING,
+    Step.REALTIME: theme.REALTIME,
     Step.FULL: theme.ACCENT,
     Step.CAPTURED: theme.GOOD,
 }

@@ -16,7 +16,8 @@ _BARE = (
     | imgui.WindowFlags_.no_saved_settings.value
     | imgui.WindowFlags_.no_nav.value
 )
-FIXED = _BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value
+# Parts of the window that do not move; app.interface fills their ground, since clearing costs less than drawing.
+FIXED = _BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value | imgui.WindowFlags_.no_background.value
 CARD = _BARE | imgui.WindowFlags_.always_auto_resize.value
 DASH = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"

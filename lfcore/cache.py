@@ -31,13 +31,18 @@ class CacheKey:
 
 def cache_key(light_field: LightField, synthesizer: Synthesizer, u: float, v: float) -> CacheKey:
     """The key of the synthesis of (u, v) from this light field by this synthesizer; u and v to 4 decimals."""
+    return CacheKey(light_field.content_key, synthesizer.key, *rounded(u, v))
+
+
+def rounded(u: float, v: float) -> tuple[float, float]:
+    """The viewpoint as caches know it: to 4 decimals."""
     # Adding 0.0 turns -0.0, which prints differently, into 0.0.
-    return CacheKey(
-        light_field.content_key,
-        synthesizer.key,
-        round(u, _POSITION_DECIMALS) + 0.0,
-        round(v, _POSITION_DECIMALS) + 0.0,
-    )
+    return round(u, _POSITION_DECIMALS) + 0.0, round(v, _POSITION_DECIMALS) + 0.0
+
+
+def held_bytes(height: int, width: int) -> int:
+    """What one synthesis with a disparity map, of pictures of this size, takes in the cache."""
+    return 8 * height * width + _ENTRY_OVERHEAD
 
 
 class SynthesisCache:

@@ -1,33 +1,11 @@
 #version 330 core
-// The disparity map for the viewpoint on screen, carried over from the viewpoint for which the networks made it.
-//
-// A point at s with disparity D in view q lies at s + (made_at - q) D in the view of the map, so D is a fixed point of
-// D = map(s + (made_at - q) D). Where a near thing has moved in front of a far one there are two; the nearer one, which
-// is the smaller (u is the camera's own position to the right, so near content moves to the left as it grows), hides
-// the other. At the map's own viewpoint the map comes out unchanged.
-uniform sampler2D disparity_map;
-uniform vec2 made_at;
+// The disparity map for the viewpoint on screen.
+#include "carry.glsl"
+
 uniform vec2 viewpoint;
-uniform float nearest_disparity;  // the smallest of the map
 
 layout(location = 0) out float disparity;
 
-float looked_up(vec2 s) {
-    ivec2 last = textureSize(disparity_map, 0) - 1;
-    return texelFetch(disparity_map, clamp(ivec2(floor(s + 0.5)), ivec2(0), last), 0).r;
-}
-
 void main() {
-    vec2 s = gl_FragCoord.xy - 0.5;
-    vec2 shift = made_at - viewpoint;
-    float from_here = looked_up(s);
-    float from_near = looked_up(s + shift * nearest_disparity);
-    float before = from_near;
-    for (int i = 0; i < 3; ++i) {
-        before = from_near;
-        from_here = looked_up(s + shift * from_here);
-        from_near = looked_up(s + shift * from_near);
-    }
-    bool near_holds = abs(from_near - before) < 0.5;
-    disparity = near_holds ? min(from_near, from_here) : from_here;
+    disparity = carried_disparity(gl_FragCoord.xy - 0.5, viewpoint);
 }

@@ -2,7 +2,6 @@
 // A picture in the window.
 #include "placement.glsl"
 #include "sampled.glsl"
-#include "tone.glsl"
 
 uniform sampler2D picture;
 uniform float dim;  // 1: as it is
@@ -10,5 +9,5 @@ uniform float dim;  // 1: as it is
 layout(location = 0) out vec4 colour;
 
 void main() {
-    colour = vec4(toned(sampled(picture, picture_point())) * dim, 1.0);
+    colour = vec4(sampled(picture, picture_point()) * dim, 1.0);
 }

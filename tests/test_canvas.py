@@ -13,7 +13,8 @@ from moving_scene import DISPARITY, SIZE, truth
 
 from app import glsl
 from app.canvas import BACKGROUND, Canvas, Frame, Target
-from app.state import Look, Rect, Zoom, place
+from app.engine import _pixels
+from app.state import CARRIED_FAR, CARRIED_NEAR, Look, Rect, Zoom, place
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray, as_float
@@ -24,7 +25,7 @@ VIEWPOINTS = ((0.3, 0.4), (0.0, 1.0), (-0.2, 1.1))
 
 @pytest.fixture
 def canvas(gl: Any) -> Iterator[Canvas]:
-    made = Canvas(gl)
+    made = Canvas(gl, "f4")  # pictures in float32, to be compared exactly
     yield made
     made.clear()
     assert gl.error == "GL_NO_ERROR"
@@ -35,6 +36,11 @@ def random_corners(dtype: str, seed: int = 0) -> npt.NDArray[np.generic]:
     if dtype == "float32":
         return values.astype(np.float32)
     return (values * np.iinfo(dtype).max).astype(dtype)
+
+
+def give(canvas: Canvas, image: FloatArray, disparity: FloatArray | None, viewpoint: tuple[float, float]) -> None:
+    """Hand a synthesis to the canvas, as the interface does."""
+    canvas.set_synthesis(image, _pixels(image), disparity, viewpoint)
 
 
 def moving_corners() -> FloatArray:
@@ -69,7 +75,7 @@ def test_warped_inputs_are_the_backward_warp(canvas: Canvas, dtype: str) -> None
     chance = np.random.default_rng(1)
     disparity = chance.uniform(-5, 5, SIZE).astype(np.float32)
     for viewpoint in VIEWPOINTS:
-        canvas.set_synthesis(truth(*viewpoint), disparity, viewpoint)
+        give(canvas, truth(*viewpoint), disparity, viewpoint)
         sheet = canvas.read(Frame(Look.WARPED_ALL, viewpoint))
         for look in Look:
             if look.corner is None:
@@ -93,8 +99,8 @@ def test_error_is_the_absolute_difference_times_gain(canvas: Canvas, dtype: str)
     captured = random_corners(dtype, seed=2)[0]
     canvas.set_captured(captured)
     image = truth(0.5, 0.5)
-    canvas.set_synthesis(image, None, (0.5, 0.5))
-    shown = canvas.read(Frame(Look.ERROR, (0.5, 0.5), full_share=1.0, gain=4.0))
+    give(canvas, image, None, (0.5, 0.5))
+    shown = canvas.read(Frame(Look.ERROR, (0.5, 0.5), gain=4.0))
     np.testing.assert_allclose(shown, 4 * np.abs(image - as_float(captured)), atol=2e-6)
 
 
@@ -102,10 +108,10 @@ def test_captured_view_and_synthesis_are_shown_as_they_are(canvas: Canvas) -> No
     canvas.set_light_field(random_corners("uint8"))
     captured = random_corners("uint8", seed=3)[1]
     canvas.set_captured(captured)
-    canvas.set_synthesis(truth(0.5, 0.5), None, (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), None, (0.5, 0.5))
     shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), captured=True))
     np.testing.assert_allclose(shown, as_float(captured), atol=1e-6)
-    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), full_share=1.0))
+    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5)))
     np.testing.assert_allclose(shown, truth(0.5, 0.5), atol=1e-6)
 
 
@@ -120,7 +126,7 @@ def test_blend_is_the_bilinear_mean_of_the_corners(canvas: Canvas) -> None:
 
 def test_instant_with_the_true_disparity_is_the_true_view(canvas: Canvas) -> None:
     canvas.set_light_field(moving_corners())
-    canvas.set_synthesis(truth(0.5, 0.5), np.full(SIZE, DISPARITY, np.float32), (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), np.full(SIZE, DISPARITY, np.float32), (0.5, 0.5))
     margin = 9  # content that some corner does not see
     inside = (slice(margin, -margin), slice(margin, -margin))
     for u, v in ((0.5, 0.5), (0.2, 0.9), (0.0, 0.0), (1.1, -0.2)):
@@ -131,7 +137,7 @@ def test_instant_with_the_true_disparity_is_the_true_view(canvas: Canvas) -> Non
 def test_instant_at_a_corner_is_that_corner_whatever_the_disparity(canvas: Canvas) -> None:
     corners = random_corners("float32")
     canvas.set_light_field(corners)
-    canvas.set_synthesis(truth(0.5, 0.5), np.full(SIZE, 3.0, np.float32), (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), np.full(SIZE, 3.0, np.float32), (0.5, 0.5))
     for corner, viewpoint in enumerate(CORNERS):
         np.testing.assert_allclose(canvas.read(Frame(Look.SYNTHESIS, viewpoint)), corners[corner], atol=1e-5)
 
@@ -140,8 +146,40 @@ def test_instant_believes_the_views_that_agree(canvas: Canvas) -> None:
     corners = np.full((4, HEIGHT, WIDTH, 3), 0.2, np.float32)
     corners[3] = 0.9  # one view sees something else
     canvas.set_light_field(corners)
-    canvas.set_synthesis(truth(0.5, 0.5), np.zeros(SIZE, np.float32), (0.5, 0.5))
+    give(canvas, truth(0.1, 0.5), np.zeros(SIZE, np.float32), (0.1, 0.5))
     np.testing.assert_allclose(canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5))), 0.2, atol=0.01)
+
+
+EIGHT_BITS = 0.51 / 255
+INSIDE = (slice(3, -3), slice(3, -3))  # what the edge, repeated by the bicubic taps, has no part in
+
+
+def test_a_synthesis_is_carried_to_viewpoints_nearby(canvas: Canvas) -> None:
+    canvas.set_light_field(random_corners("uint8"))  # of no use: nothing of them may be seen
+    give(canvas, truth(0.5, 0.5), np.full(SIZE, DISPARITY, np.float32), (0.5, 0.5))
+    for viewpoint in ((0.5, 0.5), (0.46, 0.53), (0.5 + CARRIED_NEAR, 0.5)):
+        shown = canvas.read(Frame(Look.SYNTHESIS, viewpoint))
+        np.testing.assert_allclose(shown[INSIDE], truth(*viewpoint)[INSIDE], atol=2e-3 + EIGHT_BITS)
+
+
+def test_farther_away_the_warped_corners_take_its_place_little_by_little(canvas: Canvas) -> None:
+    canvas.set_light_field(np.zeros((4, *SIZE, 3), np.uint8))
+    give(canvas, np.ones((*SIZE, 3), np.float32), np.zeros(SIZE, np.float32), (0.5, 0.5))
+    for distance in (0.05, 0.12, 0.15, 0.19, 0.25):
+        shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5 + distance)))
+        np.testing.assert_allclose(shown, np.interp(distance, (CARRIED_NEAR, CARRIED_FAR), (1, 0)), atol=1e-5)
+
+
+def test_a_moving_picture_fades_from_one_synthesis_to_the_next_both_carried(canvas: Canvas) -> None:
+    canvas.set_light_field(random_corners("uint8"))
+    disparity = np.full(SIZE, DISPARITY, np.float32)
+    give(canvas, 0.5 * truth(0.45, 0.5), disparity, (0.45, 0.5))  # half as bright, so that its share is seen
+    give(canvas, truth(0.47, 0.52), disparity, (0.47, 0.52))
+    viewpoint = (0.5, 0.52)
+    for share in (0.0, 0.25, 0.9, 1.0):
+        shown = canvas.read(Frame(Look.SYNTHESIS, viewpoint, share=share))
+        expected = (0.5 * (1 - share) + share) * truth(*viewpoint)
+        np.testing.assert_allclose(shown[INSIDE], expected[INSIDE], atol=2e-3 + EIGHT_BITS)
 
 
 def disparity_shown(canvas: Canvas, viewpoint: tuple[float, float], low: float, high: float) -> FloatArray:
@@ -155,7 +193,7 @@ def disparity_shown(canvas: Canvas, viewpoint: tuple[float, float], low: float, 
 def test_disparity_is_shown_by_the_colour_map_within_its_range(canvas: Canvas) -> None:
     canvas.set_light_field(moving_corners())
     disparity = np.tile(np.linspace(-4, 4, WIDTH, dtype=np.float32), (HEIGHT, 1))
-    canvas.set_synthesis(truth(0.5, 0.5), disparity, (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), disparity, (0.5, 0.5))
     shown = disparity_shown(canvas, (0.5, 0.5), -3, 2)
     np.testing.assert_allclose(shown, np.clip(disparity, -3, 2), atol=5 / 255 * 1.5)
 
@@ -165,7 +203,7 @@ def test_disparity_is_carried_to_another_viewpoint_and_near_hides_far(canvas: Ca
     canvas.set_light_field(moving_corners())
     disparity = np.zeros(SIZE, np.float32)
     disparity[30:60, 40:80] = -8
-    canvas.set_synthesis(truth(0.5, 0.5), disparity, (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), disparity, (0.5, 0.5))
     expected = np.zeros(SIZE, np.float32)
     expected[30:60, 44:84] = -8
     shown = disparity_shown(canvas, (0.0, 0.5), -8, 0)
@@ -173,12 +211,36 @@ def test_disparity_is_carried_to_another_viewpoint_and_near_hides_far(canvas: Ca
     assert (np.abs(shown - expected) > 0.1).mean() < 0.011  # the strip uncovered at its left, 30 x 4 px, is anyone's guess
 
 
-def test_cross_fade_is_the_weighted_mean(canvas: Canvas) -> None:
+def test_at_rest_one_synthesis_fades_into_the_other(canvas: Canvas) -> None:
+    canvas.set_light_field(random_corners("uint8"))
+    first, second = (as_float(random_corners("uint8", seed)[0]) for seed in (7, 8))
+    for image in (first, second):
+        give(canvas, image, np.full(SIZE, DISPARITY, np.float32), (0.4, 0.4))
+    for share in (0.0, 0.25, 1.0):
+        shown = canvas.read(Frame(Look.SYNTHESIS, (0.4, 0.4), share=share))
+        np.testing.assert_allclose(shown, (1 - share) * first + share * second, atol=1e-5)
+
+
+def test_the_first_synthesis_fades_in_over_the_blend(canvas: Canvas) -> None:
     canvas.set_light_field(moving_corners())
-    canvas.set_synthesis(np.ones((*SIZE, 3), np.float32), np.full(SIZE, DISPARITY, np.float32), (0.4, 0.4))
-    before = canvas.read(Frame(Look.SYNTHESIS, (0.4, 0.4), full_share=0.0))
-    shown = canvas.read(Frame(Look.SYNTHESIS, (0.4, 0.4), full_share=0.25))
+    before = canvas.read(Frame(Look.SYNTHESIS, (0.4, 0.4)))
+    give(canvas, np.ones((*SIZE, 3), np.float32), np.full(SIZE, DISPARITY, np.float32), (0.4, 0.4))
+    shown = canvas.read(Frame(Look.SYNTHESIS, (0.4, 0.4), share=0.25))
     np.testing.assert_allclose(shown, 0.75 * before + 0.25, atol=1e-5)
+
+
+def test_in_8_bits_the_picture_is_as_near_as_8_bits_can_be(gl: Any) -> None:
+    canvas = Canvas(gl)
+    canvas.set_light_field(random_corners("uint8"))
+    image = np.random.default_rng(9).random((*SIZE, 3)).astype(np.float32)
+    give(canvas, image, None, (0.5, 0.5))
+    np.testing.assert_allclose(canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5))), image, atol=EIGHT_BITS)
+    # but the error is that of the exact values, times the gain
+    canvas.set_captured((image * 255).astype(np.uint8))
+    shown = canvas.read(Frame(Look.ERROR, (0.5, 0.5), gain=64.0))
+    expected = 64 * np.abs(image - (image * 255).astype(np.uint8) / np.float32(255))
+    np.testing.assert_allclose(shown, expected, atol=EIGHT_BITS + 64 * 1e-6)
+    canvas.clear()
 
 
 def test_display_tone_is_the_authors(canvas: Canvas) -> None:
@@ -186,8 +248,8 @@ def test_display_tone_is_the_authors(canvas: Canvas) -> None:
 
     canvas.set_light_field(random_corners("float32"))
     image = np.random.default_rng(5).random((*SIZE, 3)).astype(np.float32)
-    canvas.set_synthesis(image, None, (0.5, 0.5))
-    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), full_share=1.0, display_tone=True))
+    give(canvas, image, None, (0.5, 0.5))
+    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), display_tone=True))
     for y, x in ((0, 0), (5, 7), (50, 60), (95, 127)):
         hue, saturation, value = colorsys.rgb_to_hsv(*(float(c) ** (1 / 1.5) for c in image[y, x]))
         expected = colorsys.hsv_to_rgb(hue, min(1.5 * saturation, 1), value)
@@ -197,12 +259,12 @@ def test_display_tone_is_the_authors(canvas: Canvas) -> None:
 def test_targets_follow_the_viewpoint_and_the_newest_map(canvas: Canvas) -> None:
     """Passes are run again exactly when something they depend on has changed."""
     canvas.set_light_field(moving_corners())
-    canvas.set_synthesis(truth(0.5, 0.5), np.full(SIZE, DISPARITY, np.float32), (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), np.full(SIZE, DISPARITY, np.float32), (0.5, 0.5))
     frame = Frame(Look.SYNTHESIS, (0.3, 0.3))
     assert canvas.prepare(frame)
     assert not canvas.prepare(frame)
     first = canvas.read(frame)
-    canvas.set_synthesis(truth(0.5, 0.5), np.zeros(SIZE, np.float32), (0.5, 0.5))
+    give(canvas, truth(0.5, 0.5), np.zeros(SIZE, np.float32), (0.5, 0.5))
     assert canvas.prepare(frame)
     assert np.abs(canvas.read(frame) - first).max() > 0.02
     assert canvas.prepare(Frame(Look.SYNTHESIS, (0.31, 0.3)))
@@ -213,14 +275,14 @@ def test_a_pixel_lies_in_the_window_where_the_placement_says(canvas: Canvas, gl:
     canvas.set_light_field(np.zeros((4, HEIGHT, WIDTH, 3), np.uint8))
     image = np.zeros((*SIZE, 3), np.float32)
     image[70, 20] = 1
-    canvas.set_synthesis(image, None, (0.5, 0.5))
+    give(canvas, image, None, (0.5, 0.5))
     texture = gl.texture((400, 300), 4)
     framebuffer = gl.framebuffer([texture])
     target = Target(framebuffer, (400, 300))
     area = Rect(0, 0, 300, 280)
     placement = place(Zoom(scale, (0.2, 0.7)), (WIDTH, HEIGHT), area)
     canvas.begin(target)
-    canvas.draw(Frame(Look.SYNTHESIS, (0.5, 0.5), full_share=1.0), target, area, placement)
+    canvas.draw(Frame(Look.SYNTHESIS, (0.5, 0.5)), target, area, placement)
     window = np.frombuffer(framebuffer.read(components=3, alignment=1), np.uint8).reshape(300, 400, 3)[::-1]
     rows, columns = np.nonzero(window.min(axis=2) > 200)
     left, top = placement.to_window((20, 70))
@@ -238,11 +300,11 @@ def test_a_picture_made_much_smaller_keeps_its_mean(canvas: Canvas, gl: Any) -> 
     image = np.zeros((*SIZE, 3), np.float32)
     image[::2] = 1  # stripes that single samples would miss or hit
     canvas.set_light_field(random_corners("uint8"))
-    canvas.set_synthesis(image, None, (0.5, 0.5))
+    give(canvas, image, None, (0.5, 0.5))
     texture = gl.texture((32, 24), 4)
     framebuffer = gl.framebuffer([texture])
     area = Rect(0, 0, 32, 24)
-    frame = Frame(Look.SYNTHESIS, (0.5, 0.5), full_share=1.0)
+    frame = Frame(Look.SYNTHESIS, (0.5, 0.5))
     canvas.draw(frame, Target(framebuffer, (32, 24)), area, place(Zoom(), (WIDTH, HEIGHT), area))
     small = np.frombuffer(framebuffer.read(components=3, alignment=1), np.uint8).reshape(24, 32, 3)
     np.testing.assert_allclose(small[2:-2, 2:-2], 127.5, atol=12)
@@ -260,11 +322,14 @@ def test_views_too_large_for_the_graphics_are_refused(canvas: Canvas, gl: Any) -
 
 def test_a_fault_in_an_included_shader_is_named_with_file_and_line(gl: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     load = glsl.load
-    whole = load("warped.frag")
     line = "vec4 cubic_taps(float t) {"
     number = resources.files("shaders").joinpath("bicubic.glsl").read_text().splitlines().index(line) + 1
-    broken = glsl.Source(whole.text.replace(line, f"{line} oops;"), whole.places)
-    monkeypatch.setattr(glsl, "load", lambda name, *others: broken if name == "warped.frag" else load(name, *others))
+
+    def broken(name: str, *others: Any) -> glsl.Source:
+        source = load(name, *others)
+        return glsl.Source(source.text.replace(line, f"{line} oops;"), source.places)
+
+    monkeypatch.setattr(glsl, "load", broken)
     with pytest.raises(LfviewError, match=rf"bicubic\.glsl:{number}\b"):
         Canvas(gl)
 
@@ -276,7 +341,7 @@ def test_places_are_found_in_the_messages_of_all_compilers(message: str) -> None
 
 
 def test_includes_are_resolved_once_and_may_be_exchanged() -> None:
-    source = glsl.load("instant.frag")
+    source = glsl.load("instant.frag", {"tone.glsl": "tone_stored.glsl"})
     assert "#include" not in source.text
-    assert source.files == ("instant.frag", "warp.glsl", "bicubic.glsl")
-    assert "sample_area.glsl" in glsl.load("show_error.frag", {"sampled.glsl": "sample_area.glsl"}).files
+    assert source.files == ("instant.frag", "carry.glsl", "warp.glsl", "bicubic.glsl", "tone_stored.glsl")
+    assert "sample_area.glsl" in glsl.load("show_image.frag", {"sampled.glsl": "sample_area.glsl"}).files

@@ -1,0 +1,254 @@
+"""Syntheses kept on disk between runs of the program: bounded in bytes, checked when read, safe with several programs at once.
+
+One file a view, in one folder per light field and model. There are no locks and no index: files appear by a rename, are
+removed when they were used longest ago, and any program may find one gone at any time. A file that is not what it should
+be is removed and counts as never written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lfcore.atomic import atomic_path
+from lfcore.cache import CacheKey
+from lfcore.errors import OutputError
+
+if TYPE_CHECKING:
+    from lfcore.synthesizer import Synthesis
+
+DEFAULT_LIMIT = 2**30
+UNUSED_DAYS = 60.0  # views not looked at for so long are removed
+_LEFTOVER_SECONDS = 3600.0  # temporary files this old were left by a program that was killed
+_MAGIC = b"lfview view 1\n"
+_HEADER_LIMIT = 4096
+_DIGEST_BYTES = 16
+_SUFFIX = ".view"
+_DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a store holds."""
+
+    views: int
+    light_fields: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    size: int
+    used_at: float  # seconds since 1970
+
+
+def default_root() -> Path:
+    """Where views are kept: $LFVIEW_CACHE, or `lfview` in the folder that the system means for caches."""
+    chosen = os.environ.get("LFVIEW_CACHE")
+    if chosen:
+        return Path(chosen).expanduser()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        given = os.environ.get("XDG_CACHE_HOME", "")
+        base = Path(given) if given.startswith("/") else Path.home() / ".cache"  # relative ones are to be ignored
+    return base / "lfview"
+
+
+class ViewStore:
+    """Views under `root` (made when first written to), at most `limit_bytes` of them. Safe to use from threads and programs.
+
+    Image and disparity are kept as float16, as in the memory cache. A view is found again only by the light field's pixels,
+    the model's weights and the code of lfcore that made it.
+    """
+
+    def __init__(self, root: Path, limit_bytes: int = DEFAULT_LIMIT) -> None:
+        self.root = root
+        self.limit_bytes = limit_bytes
+
+    def positions(self, content: str, model: str) -> list[tuple[float, float]]:
+        """The viewpoints (u, v), to 4 decimals, kept of this light field and model."""
+        found = (_position(file.path) for file in _files(self._folder(content, model)))
+        return [position for position in found if position is not None]
+
+    def get(self, key: CacheKey, size: tuple[int, int]) -> Synthesis | None:
+        """The view under this key, whose pictures have `size` (H, W), float32 and without warped inputs; None where there
+        is none, or a damaged one, which is removed."""
+        path = self._path(key)
+        try:
+            if path.stat().st_size > _largest(size):
+                raise ValueError("too large")
+            synthesis = _unpacked(path.read_bytes(), size)
+        except OSError:
+            return None
+        except (ValueError, KeyError, TypeError):
+            _remove(path)
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(path)
+        return synthesis
+
+    def put(self, key: CacheKey, synthesis: Synthesis) -> None:
+        """Keep this view, and remove those used longest ago where there would be too many. Raises OutputError."""
+        data = _packed(synthesis)
+        if len(data) > self.limit_bytes:
+            return
+        self._make_room(len(data))
+        path = self._path(key)
+        try:
+            self.root.mkdir(mode=0o700, parents=True, exist_ok=True)  # pictures are nobody else's business
+            path.parent.mkdir(mode=0o700, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"Cannot make the folder {path.parent}: {error.strerror or error}.") from error
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(data)
+
+    def tidy(self) -> None:
+        """Remove what has not been used for UNUSED_DAYS, and what programs that were killed have left."""
+        now = time.time()
+        for folder in self._folders():
+            for entry in _entries(folder):
+                age = UNUSED_DAYS * _DAY if entry.path.suffix == _SUFFIX and entry.path.name[0] != "." else _LEFTOVER_SECONDS
+                if now - entry.used_at > age:
+                    _remove(entry.path)
+            with contextlib.suppress(OSError):
+                folder.rmdir()  # only an empty one goes
+
+    def usage(self) -> Usage:
+        """How much is kept."""
+        files = [file for folder in self._folders() for file in _files(folder)]
+        light_fields = {file.path.parent.name.partition("-")[0] for file in files}
+        return Usage(len(files), len(light_fields), sum(file.size for file in files))
+
+    def clear(self) -> None:
+        """Remove every view. Raises OutputError where some cannot be removed."""
+        for folder in self._folders():
+            for entry in _entries(folder):
+                _remove(entry.path)
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        left = self.usage().views
+        if left:
+            raise OutputError(f"Cannot remove {left} files below {self.root}; look whether they are yours to remove.")
+
+    def _make_room(self, wanted: int) -> None:
+        files = sorted((file for folder in self._folders() for file in _files(folder)), key=lambda file: file.used_at)
+        excess = sum(file.size for file in files) + wanted - self.limit_bytes
+        for file in files:
+            if excess <= 0:
+                return
+            _remove(file.path)
+            excess -= file.size
+
+    def _folders(self) -> Iterator[Path]:
+        """The folders of views; others are left alone."""
+        with contextlib.suppress(OSError), os.scandir(self.root) as entries:
+            for entry in entries:
+                if len(entry.name) == 33 and entry.name[16] == "-" and entry.is_dir(follow_symlinks=False):
+                    yield Path(entry.path)
+
+    def _folder(self, content: str, model: str) -> Path:
+        maker = hashlib.blake2b(f"{model} {_code_digest()}".encode(), digest_size=8).hexdigest()
+        seen = hashlib.blake2b(content.encode(), digest_size=8).hexdigest()
+        return self.root / f"{seen}-{maker}"
+
+    def _path(self, key: CacheKey) -> Path:
+        return self._folder(key.content, key.model) / f"{key.u:+.4f}{key.v:+.4f}{_SUFFIX}"
+
+
+@cache
+def _code_digest() -> str:
+    """Digest of lfcore's own sources: views that other code has made are not shown as this program's."""
+    digest = hashlib.blake2b(digest_size=16)
+    for module in sorted(resources.files("lfcore").iterdir(), key=lambda item: item.name):
+        if module.name.endswith(".py"):
+            digest.update(module.name.encode() + module.read_bytes())
+    return digest.hexdigest()
+
+
+def _position(path: Path) -> tuple[float, float] | None:
+    name = path.name.removesuffix(_SUFFIX)
+    half = len("+0.0000")
+    try:
+        return float(name[:half]), float(name[half:])
+    except ValueError:
+        return None
+
+
+def _entries(folder: Path) -> Iterator[_File]:
+    """The files of a folder; what vanishes meanwhile is passed over."""
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with contextlib.suppress(OSError):
+                facts = entry.stat(follow_symlinks=False)
+                yield _File(Path(entry.path), facts.st_size, facts.st_mtime)
+
+
+def _files(folder: Path) -> Iterator[_File]:
+    """The views of a folder, without files that are still being written."""
+    return (entry for entry in _entries(folder) if entry.path.suffix == _SUFFIX and entry.path.name[0] != ".")
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
+def _largest(size: tuple[int, int]) -> int:
+    return len(_MAGIC) + 4 + _HEADER_LIMIT + 8 * size[0] * size[1] + _DIGEST_BYTES
+
+
+def _packed(synthesis: Synthesis) -> bytes:
+    """Magic, length of the header, header (JSON), image and disparity (float16, little-endian), digest of all that."""
+    header = json.dumps(
+        {
+            "u": synthesis.u,
+            "v": synthesis.v,
+            "model": synthesis.model,
+            "size": synthesis.image.shape[:2],
+            "disparity": synthesis.disparity is not None,
+            "timings": dict(synthesis.timings),
+        }
+    ).encode()
+    parts = [_MAGIC, len(header).to_bytes(4, "little"), header, synthesis.image.astype("<f2").tobytes()]
+    if synthesis.disparity is not None:
+        parts.append(synthesis.disparity.astype("<f2").tobytes())
+    data = b"".join(parts)
+    return data + hashlib.blake2b(data, digest_size=_DIGEST_BYTES).digest()
+
+
+def _unpacked(data: bytes, size: tuple[int, int]) -> Synthesis:
+    """The inverse of _packed. Raises ValueError, KeyError or TypeError for anything else."""
+    from lfcore.synthesizer import Synthesis
+
+    body, digest = data[:-_DIGEST_BYTES], data[-_DIGEST_BYTES:]
+    if not body.startswith(_MAGIC) or hashlib.blake2b(body, digest_size=_DIGEST_BYTES).digest() != digest:
+        raise ValueError("damaged")
+    start = len(_MAGIC) + 4
+    length = int.from_bytes(body[len(_MAGIC) : start], "little")
+    header = json.loads(body[start : start + length])
+    height, width = size
+    pixels = height * width
+    channels = 4 if header["disparity"] else 3
+    if tuple(header["size"]) != size or len(body) != start + length + 2 * channels * pixels:
+        raise ValueError("of another size")
+    values = np.frombuffer(body, "<f2", channels * pixels, start + length).astype(np.float32)
+    image = values[: 3 * pixels].reshape(height, width, 3)
+    disparity = values[3 * pixels :].reshape(height, width) if header["disparity"] else None
+    timings = {str(stage): float(seconds) for stage, seconds in header["timings"].items()}
+    return Synthesis(float(header["u"]), float(header["v"]), str(header["model"]), image, disparity, None, timings)
