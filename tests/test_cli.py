@@ -34,6 +34,8 @@ from lfcore.planesweep import Levels
 from lfcore.sweep import PATHS
 from lfcore.synthesizer import Synthesis
 from lfcore.training.curve import CurvePoint
+from lfcore.training.patches import TrainingScene
+from lfcore.training.team import Team
 from lfcore.weights import save_weights
 
 ROOT = Path(__file__).parents[1]
@@ -294,8 +296,12 @@ def test_train_hands_its_options_to_the_loop(
         report: Callable[[loop.Progress], None],
         stopped: Callable[[], bool],
         initial: object,
+        team: Team,
+        generated: list[TrainingScene],
+        teacher: object,
     ) -> None:
-        assert initial is None
+        assert initial is None and teacher is None and team.leads
+        assert [scene.light_field.kind for scene in generated] == ["generated"]
         seen.update(config=config, runtime=runtime, out=out, run_dir=run_dir)
         assert [light_field.name for light_field in scenes] == ["a scene é"]
         assert validation == []
@@ -309,6 +315,7 @@ def test_train_hands_its_options_to_the_loop(
     monkeypatch.setattr(loop, "train", train)
     out = tmp_path / "w.safetensors"
     options = ["--steps", "5", "--patch", "40", "--batch", "8", "--lr", "0.002", "--seed", "3", "--minutes", "1.5"]
+    options += ["--generated", "1"]
     before = signal.getsignal(signal.SIGINT)
     assert main(["train", "--data", str(scene), "--out", str(out), "--device", "cpu", *options]) == 130
     assert signal.getsignal(signal.SIGINT) is before

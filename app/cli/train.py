@@ -15,13 +15,16 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from app.cli.common import Verbs, add_verb, count, open_with_progress, positive, scenes_in, share
+from app.progress import Progress as Bar
 from app.progress import bar, clock
 from lfcore.errors import InputError
 
 if TYPE_CHECKING:
     from lfcore.lightfield import LightField
     from lfcore.training.loop import Progress, TrainConfig
+    from lfcore.training.patches import TrainingScene
 
+_FIRST_SCENE = 1000  # seed of the first generated scene: the same pool for every run
 _LINE_SECONDS = 60.0  # between two lines where the output is no terminal
 
 
@@ -72,6 +75,17 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "--matching-weight", type=positive, metavar="W", default=0.03, help="how much that counts at first (default: 0.03)"
     )
     parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
+    parser.add_argument(
+        "--generated", type=int, metavar="N", default=0, help="generated scenes to train on beside the data (default: 0)"
+    )
+    parser.add_argument(
+        "--generated-share", type=share, metavar="F", default=0.5, help="share of patches from generated scenes (0.5)"
+    )
+    parser.add_argument("--textures", metavar="DIR", type=Path, help="photographs for generated scenes (default: patterns)")
+    parser.add_argument("--teacher", metavar="FILE", type=Path, help="weights of realtime whose disparity guides the training")
+    parser.add_argument(
+        "--teacher-weight", type=positive, metavar="W", default=0.1, help="how much the teacher counts (default: 0.1)"
+    )
     parser.add_argument("--init", metavar="FILE", type=Path, help="weights to go on from, in place of random ones")
     parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
     parser.add_argument(
@@ -106,7 +120,9 @@ def run(options: argparse.Namespace) -> int:
     if options.threads:
         torch.set_num_threads(options.threads)
     initial = load_weights(options.init) if options.init else None
+    teacher = load_weights(options.teacher) if options.teacher else None
     scenes, validation = _open_all(data), _open_all(held_out)
+    generated = _generated(options)
     reporter = _Reporter()
     with _stop_on_signal() as stop, join_team(options.device) as team:
         train(
@@ -118,8 +134,10 @@ def run(options: argparse.Namespace) -> int:
             make_folder(run_dir),
             reporter,
             stop,
-            initial,
-            team,
+            initial=initial,
+            team=team,
+            generated=generated,
+            teacher=teacher,
         )
     if not team.leads:
         return 0
@@ -144,11 +162,33 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         steps=options.steps,
         learning_rate=options.lr,
         decay_share=options.decay,
-        loss=LossConfig(options.matching, options.matching_weight, options.balance),
+        loss=LossConfig(options.matching, options.matching_weight, options.teacher_weight, options.balance),
         seed=options.seed,
+        generated_share=options.generated_share,
         patches=patches,
         model=options.model,
     )
+
+
+def _generated(options: argparse.Namespace) -> list[TrainingScene]:
+    """The pool of generated scenes; about a second and a half of one core each."""
+    from lfcore.machine import core_count
+    from lfcore.training.generated import SceneConfig, Textures, generate_pool
+    from lfcore.training.patches import TrainingScene
+
+    if not options.generated:
+        return []
+    textures = Textures(options.textures)
+    with Bar("generating scenes", options.generated, "scenes") as shown:
+        pool = generate_pool(
+            options.generated,
+            _FIRST_SCENE,
+            textures,
+            SceneConfig(),
+            core_count(),
+            lambda done: shown.reach(done / options.generated),
+        )
+        return [TrainingScene(scene.light_field, scene.low, scene.high) for scene in pool]
 
 
 def _open_all(paths: list[Path]) -> list[LightField]:

@@ -25,6 +25,8 @@ class CameraConfig:
     wandering: Range = (0.0, 0.012)  # deviation of each view's (u, v), in baselines
     gain_deviation: Range = (0.0, 0.015)  # of the views' brightness, relative
     tint_deviation: Range = (0.0, 0.008)  # of the views' red, green and blue, relative
+    dark_paleness: Range = (0.4, 1.3)  # how far the corner views of an ESLF's scene lose colour, in units of _PALE
+    bright_paleness: Range = (0.0, 0.5)  # those of the gamma-encoded ones, as toolboxes decode them
     vignette: Range = (0.0, 0.12)  # how much darker the corner views are
     shading: Range = (0.0, 0.10)  # how much the outer views darken towards one side of the picture
     softness: Range = (0.42, 0.75)  # px, deviation of the blur that all views share
@@ -36,8 +38,14 @@ class CameraConfig:
     bright_mean: Range = (0.08, 0.38)  # mean light of the gamma-encoded ones, before encoding
 
 
+# Colours of a corner view by those of the middle, rows red, green, blue: light that strays between neighbouring pixels under a
+# microlens mixes the outer views' colours. The mean over the four corners of train/IMG_0288, an ESLF of an Illum; toolboxes'
+# decodings (train/toys) have about a quarter of it.
+_PALE = np.array([[0.910, 0.078, 0.005], [0.023, 0.939, 0.019], [0.037, 0.072, 0.880]], np.float32)
+
+
 FAULTLESS = CameraConfig(
-    misplacement=(0, 0), wandering=(0, 0), gain_deviation=(0, 0), tint_deviation=(0, 0), vignette=(0, 0), shading=(0, 0),
+    dark_paleness=(0, 0), bright_paleness=(0, 0), misplacement=(0, 0), wandering=(0, 0), gain_deviation=(0, 0), tint_deviation=(0, 0), vignette=(0, 0), shading=(0, 0),
     outer_blur=(0, 0), shot_noise=(0, 0), read_noise=(0, 0),
 )  # fmt: skip
 
@@ -49,6 +57,7 @@ class Camera:
     positions: Tensor  # (N, 2) offsets (u, v) of the views from the middle viewpoint, in baselines
     shifts: Tensor  # (N, 2) px
     gains: FloatArray  # (N, 3)
+    mixing: FloatArray  # (N, 3, 3), stored colours by true ones
     shading: FloatArray  # (N, 2), relative change of light per half picture in x and y
     blurs: FloatArray  # (N,), px
     softness: float  # px
@@ -70,10 +79,13 @@ def draw_camera(views: int, config: CameraConfig, rng: np.random.Generator) -> C
     gains = gains * (1 + rng.uniform(*config.tint_deviation) * rng.standard_normal((count, 3)))
     gains = gains * (1 - rng.uniform(*config.vignette) * outward[:, None])
     dark = bool(rng.random() < config.dark_share)
+    paleness = rng.uniform(*(config.dark_paleness if dark else config.bright_paleness)) * outward
+    identity = np.eye(3, dtype=np.float32)
     return Camera(
         positions=torch.from_numpy((places + wandering).astype(np.float32)),
         shifts=torch.from_numpy(misplacement.astype(np.float32)),
         gains=gains.astype(np.float32),
+        mixing=(identity + paleness[:, None, None] * (_PALE - identity)).astype(np.float32),
         shading=(rng.uniform(*config.shading) * 2 * places * np.sqrt(outward)[:, None]).astype(np.float32),
         blurs=(rng.uniform(*config.outer_blur) * outward).astype(np.float32),
         softness=float(rng.uniform(*config.softness)),
@@ -97,7 +109,7 @@ def expose(light: Tensor, camera: Camera, rng: np.random.Generator) -> npt.NDArr
     table = tone_table(camera.dark)
     stored = np.empty(tuple(light.shape), np.uint8)
     for k in range(len(light)):
-        view = _soften(light[k], float(camera.blurs[k])).numpy() * (camera.gains[k] * np.float32(exposure))
+        view = (_soften(light[k], float(camera.blurs[k])).numpy() @ camera.mixing[k].T) * (camera.gains[k] * np.float32(exposure))
         view *= _shading(view.shape, camera.shading[k])
         view = add_noise(view, camera.shot_noise, camera.read_noise, rng)
         np.clip(view, 0, 1, out=view)
