@@ -92,6 +92,23 @@ class Canvas:
         self.clear()
         self._pictures = _Pictures(self.context, corners, self._picture_type)
 
+    def warm_up(self) -> None:
+        """Run every pass of the moving picture once on a made-up light field; there must be no other.
+
+        Software rasterisers compile a shader when it is first run on certain kinds of texture, which can take half a second:
+        the hand would feel it in its first movement.
+        """
+        self.set_light_field(np.zeros((4, 2, 2, 3), np.uint8))
+        image, pixels, disparity = np.zeros((2, 2, 3), np.float32), np.zeros((2, 2, 4), np.uint8), np.zeros((2, 2), np.float32)
+        here, near, far = (0.5, 0.5), (0.5, 0.45), (0.5, 0.1)
+        self.prepare(Frame(Look.SYNTHESIS, here))
+        for share in (0.5, 1.0):  # fading in over nothing, then over the one before
+            self.set_synthesis(image, pixels, disparity, here)
+            for viewpoint in (here, near, far):
+                self.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
+        self.prepare(Frame(Look.SYNTHESIS, near, share=0.5))
+        self.clear()
+
     def clear(self) -> None:
         """Forget the light field and everything that belongs to it."""
         self._resting_place.use()

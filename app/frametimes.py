@@ -15,15 +15,18 @@ _PATIENCE_SECONDS = 120.0
 _FRAME_SECONDS = 1 / 60
 _TURN_SECONDS = 4.0  # for once round the circle of viewpoints
 _RADIUS = 0.35
+_WARM_UP = (0.0, 0.05, 0.15, 0.3)  # distances from the centre, so that every shader has been compiled
 
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """Median and 95th percentile of the loop's work per frame, in milliseconds; where it was measured, and over how many."""
+    """Median and 95th percentile of the loop's work per frame, in milliseconds; over how many frames; how many syntheses came
+    to the screen a second; where it was measured."""
 
     p50_ms: float
     p95_ms: float
     frames: int
+    views_per_second: float
     where: str
 
 
@@ -36,17 +39,24 @@ def measure(controller: Controller, draw: Callable[[], None], seconds: float, wh
     where the light field or the model does not come.
     """
     _wait(controller, draw)
+    for distance in _WARM_UP * 2:
+        controller.state.move_to(0.5 + distance, 0.5)
+        draw()
     times: list[float] = []
+    views, newest = 0, controller.newest
     start = time.perf_counter()
     while (now := time.perf_counter()) - start < seconds:
         angle = 2 * math.pi * (now - start) / _TURN_SECONDS
         controller.state.move_to(0.5 + _RADIUS * math.cos(angle), 0.5 + _RADIUS * math.sin(angle))
         draw()
         spent = time.perf_counter() - now
+        views += controller.newest is not newest
+        newest = controller.newest
         times.append(1e3 * spent)
         time.sleep(max(_FRAME_SECONDS - spent, 0.0))
     ordered = sorted(times)
-    return FrameTimes(statistics.median(ordered), ordered[int(0.95 * (len(ordered) - 1))], len(ordered), where)
+    p95 = ordered[int(0.95 * (len(ordered) - 1))]
+    return FrameTimes(statistics.median(ordered), p95, len(ordered), views / seconds, where)
 
 
 def _wait(controller: Controller, draw: Callable[[], None]) -> None:

@@ -72,6 +72,11 @@ class Interface:
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
+    def warm_up(self) -> None:
+        """Make the graphics ready for the first light field, while it is being opened."""
+        if self._light_field is None:
+            self._canvas.warm_up()
+
     def shutdown(self) -> None:
         """Give imgui's GL objects back; the context must still be current."""
         self._canvas.clear()

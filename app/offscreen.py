@@ -18,11 +18,10 @@ from imgui_bundle import ImVec2, imgui
 from app import frametimes
 from app.canvas import Target, standalone_context
 from app.controller import Controller
-from app.engine import Engine
 from app.frametimes import FrameTimes
 from app.interface import Interface
-from app.opening import open_by_content, synthesizer_factory
-from app.state import Size, Step
+from app.opening import make_engine, open_by_content
+from app.state import Size
 from lfcore.atomic import atomic_path
 from lfcore.errors import LfviewError, OutputError
 
@@ -114,7 +113,7 @@ def write_png(path: Path, picture: Picture) -> None:
 
 @contextmanager
 def _controller(model: str) -> Iterator[Controller]:
-    engine = Engine(synthesizer_factory(model), cache_bytes=64 * 2**20)
+    engine = make_engine(model, cache_bytes=64 * 2**20)
     controller = Controller(engine, open_by_content, wake=lambda: None, model=model)
     try:
         yield controller
@@ -129,7 +128,7 @@ def _wait_for_synthesis(viewer: Offscreen) -> None:
         viewer.frame()
         if controller.messages:
             raise LfviewError(controller.messages[0])
-        if controller.step is Step.FULL:
+        if controller.picture is not None and controller.picture.final:
             return
         if time.monotonic() > deadline:
             raise LfviewError(f"The synthesis took more than {PATIENCE_SECONDS:.0f} s; try a smaller light field.")

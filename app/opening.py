@@ -7,7 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.engine import Engine
+from assets import weights_path
 from lfcore.lightfield import LightField
+from lfcore.store import ViewStore
 
 if TYPE_CHECKING:
     from lfcore.synthesizer import Synthesizer
@@ -18,6 +21,15 @@ def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Ca
     from lfcore.formats import open_light_field
 
     return open_light_field(path, progress=progress, cancelled=cancelled)
+
+
+QUICK = "realtime"
+
+
+def make_engine(model: str, cache_bytes: int, store: ViewStore | None = None) -> Engine:
+    """The engine on the named model or weight file. While the hand moves, the small networks stand in for larger ones."""
+    stands_in = (model == "full" or model.endswith(".safetensors")) and weights_path(QUICK).is_file()
+    return Engine(synthesizer_factory(model), cache_bytes, synthesizer_factory(QUICK) if stands_in else None, store)
 
 
 def synthesizer_factory(model: str) -> Callable[[], Synthesizer]:

@@ -22,19 +22,24 @@ def draw(area: Rect, state: ViewState, picture: Size, scale: float) -> None:
             | imgui.ButtonFlags_.mouse_button_middle.value
         )
         imgui.invisible_button("canvas", ImVec2(area.width, area.height), buttons)
-        hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
+        hovered = imgui.is_item_hovered()
+        # What imgui takes in one frame ends with at most one press or release: in the frame of a press the movement came
+        # before it and is not yet the drag's, in the frame of a release it still is.
+        held = imgui.is_item_active() or imgui.is_item_deactivated()
+        pressed = imgui.is_item_activated()
     io = imgui.get_io()
     mouse = (io.mouse_pos.x, io.mouse_pos.y)
-    if active:
-        _drag(state, (io.mouse_delta.x, io.mouse_delta.y), picture, area, scale)
+    if held:
+        delta = (0.0, 0.0) if pressed else (io.mouse_delta.x, io.mouse_delta.y)
+        _drag(state, delta, picture, area, scale)
     if hovered and io.mouse_wheel:
         state.zoom = zoom_about(state.zoom, WHEEL_STEP**io.mouse_wheel, mouse, picture, area)
     state.cursor = _under(mouse, state, picture, area) if hovered else None
 
 
 def _drag(state: ViewState, delta: tuple[float, float], picture: Size, area: Rect, scale: float) -> None:
-    moves_picture = not imgui.is_mouse_down(0) or imgui.is_key_down(imgui.Key.space)
-    if moves_picture:
+    turns = imgui.is_mouse_down(0) or imgui.is_mouse_released(0)
+    if not turns or imgui.is_key_down(imgui.Key.space):
         if delta != (0.0, 0.0):
             state.zoom = pan_by(state.zoom, delta, picture, area)
         return

@@ -20,9 +20,10 @@ from app.controller import Controller
 from app.engine import Engine
 from app.frametimes import FrameTimes
 from app.interface import Interface
-from app.opening import open_by_content, synthesizer_factory
+from app.opening import make_engine, open_by_content
 from assets import sample_path
 from lfcore.errors import LfviewError
+from lfcore.store import ViewStore, default_root
 
 TITLE = "lfview"
 WINDOW_SIZE = (1280, 800)
@@ -30,6 +31,9 @@ SMALLEST_SIZE = (200, 150)
 MEBIBYTE = 2**20
 
 _SETTLE_FRAMES = 3  # imgui shows the effect of an event up to two frames later
+# imgui takes a press and what follows it in different frames, so that a burst of presses needs as many frames to be taken.
+_FRAMES_PER_PRESS = 2
+_MOST_FRAMES = 60
 _WOKEN_FRAMES = 2
 _HOVER_SECONDS = 0.8  # after the last movement of the mouse, a tooltip may still appear
 _HOVER_INTERVAL = 0.1
@@ -41,28 +45,34 @@ class NoDisplay(LfviewError):
     """There is no display, or none with OpenGL 3.3."""
 
 
-def run_viewer(path: Path | None, model: str = "full", cache_mib: int = 512) -> int:
+def run_viewer(
+    path: Path | None, model: str = "full", cache_mib: int = 512, disk_mib: int = 1024, foresight: bool = True
+) -> int:
     """Open the window on the light field at `path` (None: the sample) and stay until it is closed. Returns the exit code 0.
 
+    cache_mib, disk_mib: bounds of the memory and (0: none) the disk for past syntheses. foresight: compute views ahead.
     Faults of light fields and models are shown in the window. Raises NoDisplay where there is no display or no OpenGL 3.3.
     """
-    engine = Engine(synthesizer_factory(model), cache_mib * MEBIBYTE)
-    show(path if path is not None else sample_path(), engine, Path(model).name)
+    store = ViewStore(default_root(), disk_mib * MEBIBYTE) if disk_mib > 0 else None
+    engine = make_engine(model, cache_mib * MEBIBYTE, store)
+    show(path if path is not None else sample_path(), engine, Path(model).name, foresight)
     return 0
 
 
-def show(path: Path, engine: Engine, model: str) -> None:
+def show(path: Path, engine: Engine, model: str, foresight: bool = True) -> None:
     """Open the window on the light field at `path` with this engine, and stay until it is closed."""
     with _window(engine, model) as (window, controller):
+        controller.state.foresight = foresight
         window.draw()  # the first frame, before anything slow is imported
         controller.open(path)
+        window.warm_up()
         window.run()
 
 
 def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTimes:
     """Frame times on the light field at `path` as `app.frametimes.measure` defines them: in a window, else off screen."""
     try:
-        with _window(Engine(synthesizer_factory(model), 512 * MEBIBYTE), model) as (window, controller):
+        with _window(make_engine(model, 512 * MEBIBYTE), model) as (window, controller):
             controller.open(path)
             return frametimes.measure(controller, window.poll_and_draw, seconds, "window")
     except NoDisplay:
@@ -123,20 +133,25 @@ class _Window:
         self._interval = _frame_interval()
         self._interface: Interface | None = None
         self._touched_at = 0.0  # last event of mouse or keyboard
+        self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
         self._title = TITLE
         imgui.create_context()
         imgui.get_io().set_ini_filename("")
         # Set before imgui sets its own callbacks, which call these.
         glfw.set_cursor_pos_callback(self._window, self._touched)
-        glfw.set_mouse_button_callback(self._window, self._touched)
-        glfw.set_scroll_callback(self._window, self._touched)
-        glfw.set_key_callback(self._window, self._touched)
+        glfw.set_mouse_button_callback(self._window, self._pressed)
+        glfw.set_scroll_callback(self._window, self._pressed)
+        glfw.set_key_callback(self._window, self._pressed)
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
 
     def attach(self, controller: Controller) -> None:
         """Show this controller's light field from now on."""
         self._interface = Interface(controller, self._context, self._scale())
+
+    def warm_up(self) -> None:
+        """See Interface.warm_up."""
+        self._at_hand.warm_up()
 
     def run(self) -> None:
         """Draw frames as they are needed until the window is closed."""
@@ -153,7 +168,8 @@ class _Window:
             else:
                 glfw.poll_events()
             if self._touched_at >= before:
-                frames_due = _SETTLE_FRAMES
+                frames_due = min(max(frames_due + _FRAMES_PER_PRESS * self._presses, _SETTLE_FRAMES), _MOST_FRAMES)
+                self._presses = 0
             elif time.monotonic() - before < wait:  # woken by a worker
                 frames_due = max(frames_due, _WOKEN_FRAMES)
             elif wait < _IDLE_INTERVAL:
@@ -226,6 +242,12 @@ class _Window:
 
     def _touched(self, *_: object) -> None:
         self._touched_at = time.monotonic()
+        if self._interface is not None:
+            self._interface.controller.touch()
+
+    def _pressed(self, *_: object) -> None:
+        self._presses += 1
+        self._touched()
 
     def _dropped(self, _: object, paths: Sequence[str]) -> None:
         """Open the first of the files or folders dropped on the window."""

@@ -16,7 +16,7 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     """The pad as a square of `size`; a click or a drag in it moves the viewpoint."""
     corner = imgui.get_cursor_screen_pos()
     imgui.invisible_button("viewpoint pad", ImVec2(size, size))
-    if imgui.is_item_active():
+    if imgui.is_item_active() or imgui.is_item_deactivated():  # what moved in the frame of the release counts
         mouse = imgui.get_mouse_pos()
         u = (mouse.x - corner.x) / size * _SPAN - EXTRAPOLATION_LIMIT
         v = (mouse.y - corner.y) / size * _SPAN - EXTRAPOLATION_LIMIT

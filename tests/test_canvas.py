@@ -313,6 +313,20 @@ def test_a_picture_made_much_smaller_keeps_its_mean(canvas: Canvas, gl: Any) -> 
     texture.release()
 
 
+def test_warming_up_compiles_what_a_moving_picture_needs_and_leaves_nothing(gl: Any) -> None:
+    canvas = Canvas(gl)
+    canvas.warm_up()
+    assert not canvas.has_light_field
+    compiled = set(canvas._passes)
+    canvas.set_light_field(random_corners("uint8"))
+    for viewpoint in ((0.5, 0.5), (0.52, 0.5), (0.65, 0.5), (0.9, 0.5)):
+        give(canvas, truth(0.5, 0.5), np.zeros(SIZE, np.float32), (0.5, 0.5))
+        for share in (0.3, 1.0):
+            canvas.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
+    assert set(canvas._passes) == compiled
+    canvas.clear()
+
+
 def test_views_too_large_for_the_graphics_are_refused(canvas: Canvas, gl: Any) -> None:
     wide = int(gl.info["GL_MAX_TEXTURE_SIZE"]) // 2 + 1
     with pytest.raises(InputError, match="graphics show at most"):

@@ -117,6 +117,30 @@ def test_number_keys_switch_the_look(screen: Screen) -> None:
         assert screen.state.look is look
 
 
+@pytest.mark.parametrize("frames", ["each", "press", "release", "all"])
+def test_a_drag_is_the_same_however_its_events_fall_into_frames(screen: Screen, frames: str) -> None:
+    """The mouse comes from elsewhere, presses, moves and lets go; some or all of that between two frames."""
+    state, io = screen.state, screen.io
+    screen.move(600, 500)
+    start, delta = (400, 300), (54, -36)
+    together = {"each": [], "press": [0, 1], "release": [2, 3], "all": [0, 1, 2, 3]}[frames]
+    events = [
+        lambda: io.add_mouse_pos_event(*start),
+        lambda: io.add_mouse_button_event(0, True),
+        lambda: io.add_mouse_pos_event(start[0] + delta[0], start[1] + delta[1]),
+        lambda: io.add_mouse_button_event(0, False),
+        lambda: io.add_mouse_pos_event(900, 200),
+    ]
+    for number, event in enumerate(events):
+        event()
+        if number not in together:
+            screen.frame()
+    screen.frame(6)
+    expected = (0.5 - delta[0] / DRAG_SPAN, 0.5 - delta[1] / DRAG_SPAN)
+    assert (state.u, state.v) == pytest.approx(expected)
+    assert not state.dragging
+
+
 @pytest.mark.parametrize("look", [Look.DISPARITY, Look.ERROR, Look.WARPED_ALL, Look.WARPED_TOP_RIGHT])
 def test_clicks_in_the_panel_switch_the_look(screen: Screen, look: Look) -> None:
     screen.find_in_panel(lambda: screen.state.look is look)

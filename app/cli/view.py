@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.cli.common import Verbs, add_model, add_verb, count
+from app.cli.common import Verbs, add_model, add_verb, count, count_or_none
 
 
 def add_parser(verbs: Verbs[Any], name: str) -> None:
@@ -17,6 +17,14 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     )
     add_model(parser)
     parser.add_argument("--cache", type=count, default=512, metavar="MIB", help="memory for past syntheses (default: 512)")
+    parser.add_argument(
+        "--disk-cache",
+        type=count_or_none,
+        default=1024,
+        metavar="MIB",
+        help="disk for syntheses between runs, all light fields together; 0 keeps none (default: 1024)",
+    )
+    parser.add_argument("--no-foresight", action="store_true", help="compute no views ahead while nothing else is to be done")
     parser.add_argument(
         "--screenshot", metavar="FILE", help="open no window; write what it would show as .png, also without a display"
     )
@@ -30,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
 
     from app.viewer import run_viewer
 
-    return run_viewer(options.path, options.model, options.cache)
+    return run_viewer(options.path, options.model, options.cache, options.disk_cache, not options.no_foresight)
 
 
 def _write_screenshot(options: argparse.Namespace) -> int:
