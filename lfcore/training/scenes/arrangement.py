@@ -78,7 +78,7 @@ def arrange(
     layers = []
     for k, (shape, grid, picture, sigma) in enumerate(zip(drawn, grids, pictures, blurs, strict=True)):
         alpha = shape.alpha
-        if 0 < k and rng.random() < config.translucent_share:
+        if k > 0 and rng.random() < config.translucent_share:
             alpha = alpha * _translucency(canvas, rng)
         rgba = torch.cat((picture * alpha.unsqueeze(-1), alpha.unsqueeze(-1)), -1)
         glint = None

@@ -1,7 +1,8 @@
-"""From layers to views: each layer sampled at its exact sub-pixel place in each view, laid over what is behind, in linear light."""
+"""From layers to views: each layer read at its exact sub-pixel place in each view, laid over what is behind, in linear light."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,11 +10,13 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from lfcore.training.scenes.sampling import sample_spline, spline_coefficients
+from lfcore.training.scenes.sampling import enlarge, read
 from lfcore.training.scenes.surfaces import CELL, Canvas, disparity_in_views
 
 # Coverage from which a layer counts as the front-most surface of a pixel.
 OPAQUE = 0.5
+
+_FAINT = 0.002  # coverage below which a layer is taken to be absent
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,16 @@ class Views:
     disparity: Tensor
 
 
+@dataclass(frozen=True)
+class _Box:
+    """Rows and columns of a picture."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+
 def render(canvas: Canvas, layers: Sequence[Layer], positions: Tensor, shifts: Tensor) -> Views:
     """Render all views; `layers` from back to front, the first covering everything.
 
@@ -56,63 +69,76 @@ def render(canvas: Canvas, layers: Sequence[Layer], positions: Tensor, shifts: T
     return Views(light[..., :3], disparity)
 
 
-def _put_over(
-    canvas: Canvas, layer: Layer, positions: Tensor, shifts: Tensor, light: Tensor, disparity: Tensor
-) -> None:
-    area = _reach(canvas, layer, positions, shifts)
-    if area is None:
+def _put_over(canvas: Canvas, layer: Layer, positions: Tensor, shifts: Tensor, light: Tensor, disparity: Tensor) -> None:
+    part = _present(layer)
+    reach = _reach(canvas, layer, part, positions, shifts) if part is not None else None
+    if part is None or reach is None:
         return
-    top, bottom, left, right = area
-    coefficients = spline_coefficients(layer.picture, layer.blur)
+    rows, columns = slice(reach.top, reach.bottom), slice(reach.left, reach.right)
+    picture = _enlarged(layer.picture, part, layer.blur)
     coarse = disparity_in_views(canvas, layer.surface, positions, shifts)
     glint = layer.glint
     if glint is not None:
-        glint_coefficients = spline_coefficients(glint.light, layer.blur)
+        glint_picture = _enlarged(glint.light, part, layer.blur)
         glint_coarse = disparity_in_views(canvas, glint.surface, positions, shifts)
     for k, (position, shift) in enumerate(zip(positions, shifts, strict=True)):
-        own = _at_pixels(coarse[k], area)
-        rgba = sample_spline(coefficients, *_places(canvas, own, position, shift, area)).clamp_min_(0)
+        own = _at_pixels(coarse[k], reach)
+        rgba = read(picture, *_places(canvas, own, position, shift, reach, part)).clamp_min_(0)
         alpha = rgba[..., 3:].clamp_max_(1)
         if glint is not None:
-            places = _places(canvas, _at_pixels(glint_coarse[k], area), position, shift, area)
-            rgba[..., :3] += sample_spline(glint_coefficients, *places).clamp_min_(0) * alpha
-        behind = light[k, top:bottom, left:right]
-        behind.mul_(1 - alpha).add_(rgba)
-        known = disparity[k, top:bottom, left:right]
-        known.copy_(torch.where(alpha[..., 0] >= OPAQUE, own, known))
+            places = _places(canvas, _at_pixels(glint_coarse[k], reach), position, shift, reach, part)
+            rgba[..., :3] += read(glint_picture, *places).clamp_min_(0) * alpha
+        behind = light[k, rows, columns]
+        torch.addcmul(rgba, behind, 1 - alpha, out=behind)
+        known = disparity[k, rows, columns]
+        torch.where(alpha[..., 0] >= OPAQUE, own, known, out=known)
 
 
-def _reach(
-    canvas: Canvas, layer: Layer, positions: Tensor, shifts: Tensor
-) -> tuple[int, int, int, int] | None:
-    """Rows and columns of a view (top, bottom, left, right) that the layer can reach, or None; top and left fit the coarse grid."""
-    covered = layer.picture[..., 3] > 0.002
+def _present(layer: Layer) -> _Box | None:
+    """The part of the layer that holds anything, with room for its blur, which may lie beyond the layer's edge.
+
+    Its size is one whose Fourier transform is quick.
+    """
+    covered = layer.picture[..., 3] > _FAINT
     rows, columns = covered.any(1).nonzero().flatten(), covered.any(0).nonzero().flatten()
     if not len(rows):
         return None
-    motion = float(layer.surface.abs().max()) * float(positions.abs().max()) + float(shifts.abs().max()) + 3 * layer.blur + 2
-    top, bottom = int(rows[0] - motion) - canvas.margin, int(rows[-1] + motion) + 2 - canvas.margin
-    left, right = int(columns[0] - motion) - canvas.margin, int(columns[-1] + motion) + 2 - canvas.margin
-    top, left = max(top, 0) // CELL * CELL, max(left, 0) // CELL * CELL
-    bottom, right = min(bottom, canvas.height), min(right, canvas.width)
-    return (top, bottom, left, right) if bottom > top and right > left else None
+    room = math.ceil(4 * layer.blur) + 2
+    top, left = int(rows[0]) - room, int(columns[0]) - room
+    height, width = (math.ceil((int(span[-1]) + 1 - int(span[0]) + 2 * room) / 16) * 16 for span in (rows, columns))
+    return _Box(top, top + height, left, left + width)
 
 
-def _at_pixels(coarse: Tensor, area: tuple[int, int, int, int]) -> Tensor:
-    """Values on a view's coarse grid at the pixels of the area, (h, w)."""
-    top, bottom, left, right = area
-    rows, columns = (bottom - top - 1) // CELL + 2, (right - left - 1) // CELL + 2
-    part = coarse[top // CELL :, left // CELL :][:rows, :columns]
+def _enlarged(picture: Tensor, part: _Box, sigma: float) -> Tensor:
+    """A part of a picture (H, W, C), blurred and enlarged; beyond the picture its edge repeats."""
+    rows = torch.arange(part.top, part.bottom).clamp_(0, picture.shape[0] - 1)
+    columns = torch.arange(part.left, part.right).clamp_(0, picture.shape[1] - 1)
+    return enlarge(picture.index_select(0, rows).index_select(1, columns), sigma)
+
+
+def _reach(canvas: Canvas, layer: Layer, part: _Box, positions: Tensor, shifts: Tensor) -> _Box | None:
+    """The part of the views that the layer can get to, or None; top and left lie on the coarse grid."""
+    motion = math.ceil(float(layer.surface.abs().max()) * float(positions.abs().max()) + float(shifts.abs().max()))
+    top, left = (max(edge - motion - canvas.margin, 0) // CELL * CELL for edge in (part.top, part.left))
+    bottom = min(part.bottom + motion - canvas.margin, canvas.height)
+    right = min(part.right + motion - canvas.margin, canvas.width)
+    return _Box(top, bottom, left, right) if bottom > top and right > left else None
+
+
+def _at_pixels(coarse: Tensor, reach: _Box) -> Tensor:
+    """Values on a view's coarse grid at the pixels within reach, (h, w)."""
+    height, width = reach.bottom - reach.top, reach.right - reach.left
+    rows, columns = (height - 1) // CELL + 2, (width - 1) // CELL + 2
+    part = coarse[reach.top // CELL :, reach.left // CELL :][:rows, :columns]
     size = (rows - 1) * CELL + 1, (columns - 1) * CELL + 1
     fine = functional.interpolate(part[None, None], size=size, mode="bilinear", align_corners=True)
-    return fine[0, 0, : bottom - top, : right - left]
+    return fine[0, 0, :height, :width]
 
 
 def _places(
-    canvas: Canvas, disparity: Tensor, position: Tensor, shift: Tensor, area: tuple[int, int, int, int]
+    canvas: Canvas, disparity: Tensor, position: Tensor, shift: Tensor, reach: _Box, part: _Box
 ) -> tuple[Tensor, Tensor]:
-    """Where on the layer the pixels of the area lie: p = s - d D."""
-    top, bottom, left, right = area
-    y = torch.arange(top, bottom, dtype=torch.float32)[:, None] + (canvas.margin - float(shift[1]))
-    x = torch.arange(left, right, dtype=torch.float32)[None] + (canvas.margin - float(shift[0]))
-    return x - float(position[0]) * disparity, y - float(position[1]) * disparity
+    """Where in the part of the layer the pixels within reach lie: p = s - d D."""
+    y = torch.arange(reach.top, reach.bottom, dtype=torch.float32)[:, None] + (canvas.margin - part.top - float(shift[1]))
+    x = torch.arange(reach.left, reach.right, dtype=torch.float32)[None] + (canvas.margin - part.left - float(shift[0]))
+    return torch.sub(x, disparity, alpha=float(position[0])), torch.sub(y, disparity, alpha=float(position[1]))
