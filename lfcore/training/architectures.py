@@ -17,7 +17,7 @@ from lfcore.compact import CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
-from lfcore.planesweep import Levels, Window, inner_plane_sweep, plane_sweep
+from lfcore.planesweep import Levels, Window, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tone import root_tone
 from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
@@ -183,7 +183,7 @@ class CompactPair:
         levels = half_resolution(model.config.levels)
         features = torch.cat(
             [
-                inner_plane_sweep(half_luma(place.images), offsets, levels, _halved(place.window))
+                plane_sweep(half_luma(place.images), offsets, levels, _halved(place.window))
                 for place, offsets in zip(places, batch.offsets, strict=True)
             ]
         )  # (sum of B, 2 L, P / 2, P / 2)

@@ -29,7 +29,7 @@ class Checkpoint:
     curve: Sequence[CurvePoint]
     model: Mapping[str, Tensor]
     average: Mapping[str, Tensor]
-    moments: Sequence[Mapping[str, Tensor]]  # Adam's state of each parameter, in the model's order
+    moments: Sequence[Mapping[str, Tensor]]  # the optimiser's state of each parameter, in the model's order
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint, config: Mapping[str, Any]) -> None:

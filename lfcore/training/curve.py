@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lfcore.atomic import atomic_path
+from lfcore.errors import InputError
+
+_LARGEST_FILE = 16 * 2**20  # bytes; a curve has a line per validation
 
 
 @dataclass(frozen=True)
@@ -36,3 +39,27 @@ def write_curve(folder: Path, curve: Sequence[CurvePoint]) -> None:
         for point in curve:
             scores = [f"{point.scores[name]:.3f}" if name in point.scores else "" for name in names]
             writer.writerow([point.step, round(point.seconds), f"{point.learning_rate:.3g}", f"{point.loss:.3g}", *scores])
+
+
+def read_curve(path: Path) -> list[CurvePoint]:
+    """Read a curve.csv. Raises InputError where there is none, or where the file is something else."""
+    if not path.is_file():
+        raise InputError(f"No training curve found at {path}; give the curve.csv of a run folder of `lfview train`.")
+    if path.stat().st_size > _LARGEST_FILE:
+        raise InputError(f"{path} has {path.stat().st_size / 2**20:.0f} MiB, too much for a training curve.")
+    fixed = {"step", "seconds", "learning_rate", "loss"}
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, strict=True))
+        return [
+            CurvePoint(
+                int(row["step"]),
+                float(row["seconds"]),
+                float(row["learning_rate"]),
+                float(row["loss"]),
+                {name: float(text) for name, text in row.items() if name not in fixed and text},
+            )
+            for row in rows
+        ]
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise InputError(f"{path} is not a training curve (columns step, seconds, learning_rate, loss, scenes).") from error

@@ -31,6 +31,7 @@ from lfcore.training.architectures import Batch, architecture
 from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loss import LossConfig, StepLoss
+from lfcore.training.optimiser import MuonAdam
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, mixed, sample_group
 from lfcore.training.plot import plot
 from lfcore.training.team import ALONE, Team
@@ -191,7 +192,7 @@ class Trainer:
         self._architecture.prepare(self._model)
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
-        self._optimiser = torch.optim.Adam(self._model.parameters(), lr=config.learning_rate, betas=(0.9, 0.999), fused=True)
+        self._optimiser = MuonAdam(self._model.parameters(), config.learning_rate)
         bfloat16 = device.type == "cuda" or fastest_dtype() == torch.bfloat16
         guide = teacher.model.eval().to(device) if teacher and isinstance(teacher.model, CompactModel) else None
         self._loss = team.share(StepLoss(self._model, self._architecture, config.loss, bfloat16, guide))
@@ -221,7 +222,7 @@ class Trainer:
         return self._architecture.levels() or Levels()
 
     def take_step(self, groups: Sequence[PatchGroup]) -> float:
-        """One step of Adam; returns the mean squared error over RGB."""
+        """One step of the optimiser; returns the mean squared error over RGB."""
         for parameters in self._optimiser.param_groups:
             parameters["lr"] = learning_rate(self._config, self.step)
         self._optimiser.zero_grad(set_to_none=True)
@@ -288,8 +289,8 @@ class Trainer:
         self._average.load_state_dict(checkpoint.average)
         for parameter, state in zip(self._model.parameters(), checkpoint.moments, strict=True):
             self._optimiser.state[parameter] = {
-                # Adam keeps its count of steps on the CPU unless it is fused; layouts follow the parameter's.
-                name: value.to(self._device) if name == "step" else torch.empty_like(parameter).copy_(value)
+                # The count of steps stays on the CPU; layouts follow the parameter's.
+                name: value if name == "step" else torch.empty_like(parameter).copy_(value)
                 for name, value in state.items()
             }
 
