@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from app.cli import bench, evaluate, info, sweep, synth, train, view
+from app.cli import bench, cache, evaluate, info, sweep, synth, train, view
 from lfcore.errors import LfviewError
 
 VERBS = {
@@ -30,6 +30,7 @@ VERBS = {
     "eval": evaluate,
     "train": train,
     "bench": bench,
+    "cache": cache,
 }
 
 _EXAMPLES = """examples:
@@ -41,6 +42,7 @@ _EXAMPLES = """examples:
   lfview eval scenes/* --model full --model mean --json scores.json --out figures
   lfview train --data training/* --val held_out/* --out weights.safetensors --minutes 60
   lfview bench --json bench.json
+  lfview cache --clear
 `lfview VERB --help` tells more."""
 
 

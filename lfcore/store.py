@@ -37,6 +37,7 @@ _HEADER_LIMIT = 4096
 _DIGEST_BYTES = 16
 _SUFFIX = ".view"
 _DAY = 86400.0
+_ATTEMPTS = 5
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,15 @@ class ViewStore:
             return
         self._make_room(len(data))
         path = self._path(key)
+        for attempt in range(_ATTEMPTS):
+            try:
+                self._write(path, data)
+                return
+            except OutputError:  # the folder may just have been removed by a program that tidies or clears
+                if path.parent.is_dir() or attempt == _ATTEMPTS - 1:
+                    raise
+
+    def _write(self, path: Path, data: bytes) -> None:
         try:
             self.root.mkdir(mode=0o700, parents=True, exist_ok=True)  # pictures are nobody else's business
             path.parent.mkdir(mode=0o700, exist_ok=True)
@@ -137,14 +147,14 @@ class ViewStore:
 
     def clear(self) -> None:
         """Remove every view. Raises OutputError where some cannot be removed."""
+        stuck = 0
         for folder in self._folders():
             for entry in _entries(folder):
-                _remove(entry.path)
+                stuck += not _remove(entry.path)
             with contextlib.suppress(OSError):
                 folder.rmdir()
-        left = self.usage().views
-        if left:
-            raise OutputError(f"Cannot remove {left} files below {self.root}; look whether they are yours to remove.")
+        if stuck:
+            raise OutputError(f"Cannot remove {stuck} files below {self.root}; look whether they are yours to remove.")
 
     def _make_room(self, wanted: int) -> None:
         files = sorted((file for folder in self._folders() for file in _files(folder)), key=lambda file: file.used_at)
@@ -204,9 +214,13 @@ def _files(folder: Path) -> Iterator[_File]:
     return (entry for entry in _entries(folder) if entry.path.suffix == _SUFFIX and entry.path.name[0] != ".")
 
 
-def _remove(path: Path) -> None:
-    with contextlib.suppress(OSError):
-        path.unlink()
+def _remove(path: Path) -> bool:
+    """Whether the file is gone, by this or by another program's doing."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True
 
 
 def _largest(size: tuple[int, int]) -> int:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
-from app.controller import FADE_SECONDS, MAGNET_RADIUS, REST_SECONDS, Controller
+from app.controller import FADE_SECONDS, MAGNET_RADIUS, REST_SECONDS, STREAM_FADE_SECONDS, Controller
 from app.engine import Engine, disparity_range
 from app.state import Look, Step
 from app.worker import Cancel
 from lfcore.errors import InputError, WeightsError
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16
+from lfcore.store import ViewStore
 
 PATIENCE = 10.0
 Progress = Callable[[float], None]
@@ -24,9 +26,11 @@ Progress = Callable[[float], None]
 class Program:
     """A controller with its own clock, fed by made-up light fields: "3x3", "2x2", and so on; anything else fails to open."""
 
-    def __init__(self, synthesizer: TruthSynthesizer) -> None:
+    def __init__(
+        self, synthesizer: TruthSynthesizer, quick: TruthSynthesizer | None = None, store: ViewStore | None = None
+    ) -> None:
         self.synthesizer = synthesizer
-        self.engine = Engine(lambda: synthesizer, 64 * 2**20)
+        self.engine = Engine(lambda: synthesizer, 64 * 2**20, None if quick is None else lambda: quick, store)
         self.controller = Controller(self.engine, self.opened, lambda: None, "truth")
         self.now = 100.0
 
@@ -306,3 +310,230 @@ def test_disparity_range_leaves_out_the_tails() -> None:
     low, high = disparity_range((2.0,) * 101, 0)
     assert high - low == pytest.approx(0.1)
     assert (low + high) / 2 == pytest.approx(2)
+
+
+# Two models: a quick one while the hand moves, another when it rests.
+
+
+@pytest.fixture
+def pair() -> Iterator[tuple[Program, TruthSynthesizer]]:
+    quick = TruthSynthesizer()
+    quick.name = "realtime"
+    made = Program(TruthSynthesizer(), quick)
+    yield made, quick
+    made.controller.stop()
+
+
+def test_the_quick_model_serves_the_moving_hand_and_the_other_the_resting_one(
+    pair: tuple[Program, TruthSynthesizer],
+) -> None:
+    program, _ = pair
+    controller = program.controller
+    program.open("3x3")
+    program.until(lambda: controller.step is Step.REALTIME)  # the first picture, too, is the quick one's
+    assert program.synthesizer.asked == []
+    program.until_full()
+    program.tick(FADE_SECONDS)
+    for part in range(1, 6):
+        controller.state.move_to(0.5 + 0.01 * part, 0.5)
+        program.until(lambda: controller.picture is not None)
+        assert controller.step is Step.REALTIME
+        program.tick(FADE_SECONDS / 2)
+    assert program.synthesizer.asked == [(0.5, 0.5)]
+    program.until_full()
+    assert program.synthesizer.asked == [(0.5, 0.5), (0.55, 0.5)]
+    assert controller.picture is not None
+    assert controller.picture.final
+
+
+def test_a_synthesis_for_the_resting_hand_is_broken_off_as_soon_as_the_hand_moves(
+    pair: tuple[Program, TruthSynthesizer],
+) -> None:
+    program, quick = pair
+    controller = program.controller
+    program.open("3x3")
+    program.until_full()
+    program.tick(FADE_SECONDS)
+    program.synthesizer.seconds = 60.0
+    controller.state.move_to(0.3, 0.3)
+    program.until(lambda: (0.3, 0.3) in program.synthesizer.asked)
+    controller.state.move_to(0.31, 0.3)
+    program.until(lambda: (0.31, 0.3) in quick.asked)  # long before the 60 s are over
+
+
+def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Program, TruthSynthesizer]) -> None:
+    program, quick = pair
+    controller = program.controller
+    program.open("3x3")
+    program.until_full()
+    program.tick(FADE_SECONDS)
+    controller.state.move_to(0.52, 0.5)
+    program.tick(0.0)
+    assert controller.step is Step.INSTANT  # carried, but not made by the quick model
+    program.until(lambda: controller.picture is not None)
+    quick.seconds = 60.0
+    controller.state.move_to(0.54, 0.5)
+    program.tick(0.0)
+    assert controller.picture is None
+    assert controller.step is Step.REALTIME
+    controller.state.move_to(0.9, 0.5)
+    program.tick(0.0)
+    assert controller.step is Step.INSTANT  # too far to be carried
+
+
+def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(pair: tuple[Program, TruthSynthesizer]) -> None:
+    program, _ = pair
+    controller = program.controller
+    program.open("3x3")
+    program.until_full()
+    program.tick(FADE_SECONDS)
+    changed_at = []
+    newest = controller.newest
+    for step in range(40):
+        controller.state.move_to(0.5 + 0.002 * step, 0.5)
+        for _ in range(5):
+            time.sleep(0.001)
+            program.tick(0.002)
+            if controller.newest is not newest:
+                newest = controller.newest
+                changed_at.append(program.now)
+    assert len(changed_at) > 3
+    assert min(later - earlier for earlier, later in pairwise(changed_at)) >= STREAM_FADE_SECONDS - 1e-6
+
+
+def test_a_quick_model_that_cannot_be_loaded_is_said_and_the_other_serves_alone() -> None:
+    def broken() -> TruthSynthesizer:
+        raise WeightsError("The weights of realtime are damaged; get them again.")
+
+    program = Program(TruthSynthesizer())
+    program.controller.stop()
+    engine = Engine(lambda: program.synthesizer, 2**26, broken)
+    program.controller = Controller(engine, program.opened, lambda: None, "truth")
+    try:
+        program.open("3x3")
+        program.until_full()
+        assert program.controller.messages == ["The weights of realtime are damaged; get them again."]
+        program.controller.state.move_to(0.3, 0.3)
+        program.until_full()
+    finally:
+        program.controller.stop()
+
+
+# Foresight and the disk.
+
+
+def test_idle_time_is_used_for_what_may_be_wanted_next_and_none_of_it_twice(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.tick(1.0)
+    captured = {(u / 2, v / 2) for u in range(3) for v in range(3)}
+    program.until(lambda: captured <= set(program.controller.readout(None).cached))
+    program.tick(1.0)
+    for _ in range(10):
+        time.sleep(0.002)
+        program.tick(0.1)
+    assert sorted(program.synthesizer.asked) == sorted(captured)
+    assert program.controller.next_frame_in is None  # and then it is quiet
+    before = len(program.synthesizer.asked)
+    program.controller.state.move_to(1.0, 0.5)
+    program.tick()
+    assert program.controller.step is Step.FULL  # on the next frame
+    assert len(program.synthesizer.asked) == before
+
+
+def test_foresight_goes_along_the_direction_of_travel_first(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.controller.state.move_to(0.48, 0.5)  # an arrow key
+    program.until_full()
+    program.tick(1.0)
+    program.until(lambda: len(program.synthesizer.asked) >= 4)
+    assert program.synthesizer.asked[2:4] == [pytest.approx((0.46, 0.5)), pytest.approx((0.44, 0.5))]
+
+
+def test_foresight_stops_at_once_when_the_person_does_something_and_may_be_switched_off(program: Program) -> None:
+    controller = program.controller
+    program.open("3x3")
+    program.until_full()
+    program.synthesizer.seconds = 60.0
+    program.tick(1.0)
+    program.until(lambda: len(program.synthesizer.asked) == 2)
+    assert "ahead" in controller.readout(None).busy
+    controller.touch()
+    program.until(lambda: not controller._synthesis.busy)  # long before the 60 s are over
+    program.tick(0.1)
+    assert len(program.synthesizer.asked) == 2
+    program.tick(1.0)
+    program.until(lambda: len(program.synthesizer.asked) == 3)  # and goes on after a while
+    program.synthesizer.seconds = 0.0
+    controller.state.move_to(0.3, 0.3)  # an actual query does not wait for it
+    program.until_full()
+    controller.state.foresight = False
+    asked = len(program.synthesizer.asked)
+    program.tick(1.0)
+    for _ in range(20):
+        time.sleep(0.002)
+        program.tick(0.1)
+    assert len(program.synthesizer.asked) == asked
+
+
+def test_foresight_does_not_drive_out_what_is_in_memory() -> None:
+    program = Program(TruthSynthesizer())
+    program.controller.stop()
+    held = 96 * 128 * 8 + 1024
+    engine = Engine(lambda: program.synthesizer, int(5.7 * held))
+    program.controller = Controller(engine, program.opened, lambda: None, "truth")
+    try:
+        program.open("3x3")
+        program.until_full()
+        for _ in range(50):
+            time.sleep(0.002)
+            program.tick(0.5)
+        assert len(program.controller.readout(None).cached) == 5  # of nine
+        assert (0.5, 0.5) in program.controller.readout(None).cached
+    finally:
+        program.controller.stop()
+
+
+def test_what_one_run_has_synthesized_the_next_one_has_at_once(tmp_path: Path) -> None:
+    first = Program(TruthSynthesizer(), store=ViewStore(tmp_path))
+    try:
+        first.open("3x3")
+        first.until_full()
+        first.controller.state.foresight = False
+        first.controller.state.move_to(0.3, 0.4)
+        first.until_full()
+        first.until(lambda: ViewStore(tmp_path).usage().views == 2)
+    finally:
+        first.controller.stop()
+    second = Program(TruthSynthesizer(), store=ViewStore(tmp_path))
+    try:
+        second.controller.state.foresight = False
+        second.open("3x3")
+        second.until_full()
+        assert second.controller.readout(None).from_cache
+        assert second.controller.readout(None).score is not None
+        second.until(lambda: len(second.controller.readout(None).cached) == 2)
+        second.controller.state.move_to(0.3, 0.4)
+        second.tick()
+        assert second.controller.step is Step.FULL
+        assert second.synthesizer.asked == []
+    finally:
+        second.controller.stop()
+
+
+def test_a_disk_that_cannot_be_written_is_said_once_and_the_viewer_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file where the folder should be")
+    program = Program(TruthSynthesizer(), store=ViewStore(tmp_path / "taken"))
+    try:
+        program.open("3x3")
+        program.until(lambda: bool(program.controller.messages))
+        assert "not kept on disk" in program.controller.messages[0]
+        program.controller.dismiss()
+        for u in (0.3, 0.4):
+            program.controller.state.move_to(u, 0.3)
+            program.until_full()
+            program.tick(1.0)
+        assert program.controller.messages == []
+    finally:
+        program.controller.stop()
