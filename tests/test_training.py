@@ -1,3 +1,4 @@
+import copy
 import itertools
 import math
 from pathlib import Path
@@ -7,15 +8,19 @@ import pytest
 import torch
 from scenes import plane
 
+from lfcore.compact import CompactModel
+from lfcore.compact_synthesizer import CompactSynthesizer
 from lfcore.errors import InputError
 from lfcore.export import write_picture
-from lfcore.lightfield import LightField
+from lfcore.lightfield import CORNERS, LightField
 from lfcore.models import TRAINABLE
+from lfcore.networks import BORDER, FullModel, initialise
 from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
+from lfcore.training.architectures import Batch, architecture
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, learning_rate, prepare_scene, train
-from lfcore.training.loss import LossConfig
+from lfcore.training.loss import LossConfig, StepLoss
 from lfcore.training.patches import PatchConfig, TrainingScene, margin, mixed, sample_group
 from lfcore.training.plot import plot
 from lfcore.warp import backward_warp
@@ -146,6 +151,44 @@ def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None
     assert found.training["config"]["initial"] == given.digest
     for name, value in given.model.state_dict().items():  # next to nothing was learnt, so the weights are those given
         torch.testing.assert_close(found.model.state_dict()[name], value, atol=1e-5, rtol=1e-4)
+
+
+def test_a_teacher_adds_the_distance_to_its_disparity(tmp_path: Path) -> None:
+    train_small(tmp_path, 1, "teacher", model="realtime")
+    teacher = load_weights(tmp_path / "teacher.safetensors")
+    assert isinstance(teacher.model, CompactModel)
+    pair, model = architecture("full"), FullModel()
+    initialise(model, 1)
+    batch = Batch.of([sample_group([scene(3.0)], SMALL, LEVELS, np.random.default_rng(5))], torch.device("cpu"))
+    weight = LossConfig(matching_steps=0, teacher_weight=0.7)
+    with torch.no_grad():
+        _, alone = StepLoss(model, pair, weight, False)(batch, 0)
+        _, taught = StepLoss(model, pair, weight, False, teacher.model)(batch, 0)
+        disparity = pair.predict(model, batch, lambda: torch.autocast("cpu", enabled=False)).disparity
+    # The teacher's own synthesizer, on a picture that is the patch with its margin, sees the same.
+    group = batch.groups[0]
+    views = np.zeros((2, 2, *group.inputs.shape[-2:], 3), np.float32)
+    wanted = []
+    for patch in range(group.inputs.shape[1]):
+        for k, (u, v) in enumerate(CORNERS):
+            views[int(v), int(u)] = group.inputs[k, patch].transpose(1, 2, 0)
+        synthesizer = CompactSynthesizer(copy.deepcopy(teacher.model), "teacher", torch.float32)
+        synthesizer.set_light_field(LightField(views.copy(), "patch", "", ""))
+        found = synthesizer.synthesize(group.u, group.v).disparity
+        assert found is not None
+        w = group.window
+        wanted.append(found[w.top + BORDER : w.bottom - BORDER, w.left + BORDER : w.right - BORDER])
+    assert disparity is not None
+    distance = torch.nn.functional.smooth_l1_loss(disparity[:, 0], torch.from_numpy(np.stack(wanted)))
+    assert float(taught - alone) == pytest.approx(0.7 * float(distance), rel=0.15)  # what lies beyond the patch differs
+
+
+def test_only_the_small_pair_can_teach(tmp_path: Path) -> None:
+    train_small(tmp_path, 1, "full")
+    teacher, scenes = load_weights(tmp_path / "full.safetensors"), [plane(2.0, (3, 3), (120, 120))]
+    out, run = tmp_path / "o.safetensors", tmp_path / "r"
+    with pytest.raises(InputError, match="only realtime can teach"):
+        train(TrainConfig(steps=1, patches=SMALL), Runtime("cpu"), scenes, [], out, run, print, lambda: False, teacher=teacher)
 
 
 def load_checkpoint_tensors(run: Path) -> dict[str, torch.Tensor]:

@@ -48,7 +48,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         type=Path,
         nargs="+",
         required=True,
-        help="light fields of at least 3 x 3 views, or folders of them",
+        help="light fields of at least 3 x 3 views, or folders of them; one named twice is drawn twice as often",
     )
     parser.add_argument(
         "--val",
@@ -192,7 +192,9 @@ def _generated(options: argparse.Namespace) -> list[TrainingScene]:
 
 
 def _open_all(paths: list[Path]) -> list[LightField]:
-    return [open_with_progress(path) for path in paths]
+    """The light fields; one that is named twice is opened once, and drawn twice as often."""
+    opened = {path: open_with_progress(path) for path in dict.fromkeys(paths)}
+    return [opened[path] for path in paths]
 
 
 class _Stop:

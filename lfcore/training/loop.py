@@ -144,7 +144,7 @@ def train(
             point = None
             if team.leads and (ending or now - last_validation > 60 * runtime.validate_minutes):
                 point = trainer.validate(validation, running)
-                trainer.save(out, [*scenes, *(scene.light_field for scene in generated)], validation)
+                trainer.save(out, scenes, len(generated), validation)
                 last_validation = time.monotonic()
             rate = (trainer.step - first_step) / max(now - began, 1e-9)
             if team.leads:
@@ -251,7 +251,9 @@ class Trainer:
         self._curve.append(point)
         return point
 
-    def save(self, out: Path, scenes: Sequence[LightField], validation: Sequence[LightField]) -> None:
+    def save(
+        self, out: Path, scenes: Sequence[LightField], generated: int, validation: Sequence[LightField]
+    ) -> None:
         """Checkpoint, curve, and the weights if they are the best so far."""
         best = max(self._curve, key=lambda point: point.mean)
         if best is self._curve[-1] or not validation:
@@ -259,7 +261,8 @@ class Trainer:
                 "steps": self.step,
                 "hours": round(self._elapsed() / 3600, 3),
                 "config": asdict(self._config),
-                "scenes": [scene.name for scene in scenes],
+                "scenes": sorted({scene.name for scene in scenes}),
+                "generated_scenes": generated,
                 "k16_psnr": {name: round(value, 3) for name, value in self._curve[-1].scores.items()},
             }
             save_weights(out, self._architecture.plain(self._average), training)
