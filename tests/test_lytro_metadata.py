@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from lfcore.errors import InputError
-from lfcore.formats.lytro.container import open_container, write_container
+from lfcore.formats.lytro.container import open_container, reference_to, write_container
 from lfcore.formats.lytro.fields import Fields, parse_object
 from lfcore.formats.lytro.metadata import Capture, Generation, capture_of, frame_in_text, read_capture
 from tests.lytro_files import SERIAL, SHARED, f01_public, illum_public, private, write_f01, write_illum
@@ -201,6 +201,19 @@ def test_references_into_nothing(tmp_path: Path) -> None:
     assert capture is not None
     assert capture.image is None
     assert capture.facts.serial == SERIAL
+
+
+def test_a_mosaic_of_another_length(tmp_path: Path) -> None:
+    table = {"frames": [{"frame": {"metadata": illum_public(), "imageRef": reference_to(bytes(3841))}}]}
+    write_container(tmp_path / "a.LFR", table, [bytes(3841)])
+    with pytest.raises(InputError, match=r"holds 3,841 bytes, but a mosaic of 64 x 48 px in 10 bits takes 3,840;"):
+        read_capture(open_container(tmp_path / "a.LFR"))
+
+
+def test_many_frames(tmp_path: Path) -> None:
+    write_container(tmp_path / "a.LFR", {"frames": [{"frame": {"metadata": illum_public()}}] * 17}, [])
+    with pytest.raises(InputError, match="claims 17 frames"):
+        read_capture(open_container(tmp_path / "a.LFR"))
 
 
 @pytest.mark.parametrize("frames", [7, [7], [{"frame": 7}], [{"frame": {"metadata": 7}}], [{"frame": {"metadataRef": 7}}]])

@@ -193,7 +193,10 @@ def _section(path: Path, header: bytes, number: int, position: int, size: int) -
     magic, version, length, name, _ = _SECTION_HEADER.unpack(header)
     kind = _SECTION_MAGIC.fullmatch(magic)
     if kind is None:
-        raise InputError(f"{path}: no section begins at byte {position}, where section {number} of the Lytro container should: it is damaged.")
+        raise InputError(
+            f"{path}: no section begins at byte {position}, where section {number} of the Lytro container should; it is "
+            "damaged: copy it again."
+        )
     if version != 0:
         raise InputError(f"{path}: section {number} is of version {version}; expected version 0, so the file is damaged.")
     if _NAME.fullmatch(name) is None:

@@ -6,14 +6,18 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
+from itertools import islice
 from pathlib import PurePosixPath
 from typing import Any
 
+from lfcore.errors import InputError
 from lfcore.formats.lytro.container import Container, Section
 from lfcore.formats.lytro.fields import Fields, printable
 from lfcore.formats.lytro.metadata import Capture, read_capture
 
 _MAX_PICTURE_SIDE = 65_535
+_MAX_PICTURES = 400
 _MAX_PLACE = 120  # characters
 _MAX_FILE_NAME = 100
 
@@ -89,19 +93,30 @@ class Contents:
     maps: tuple[StoredMap, ...]
     files: tuple[StoredFile, ...]
 
-    @property
+    @cached_property
     def stack(self) -> tuple[StoredPicture, ...]:
         """The pictures of the refocus stack that have a focus value, from near to far."""
-        focused = [picture for picture in self.pictures if picture.label == _STACK and picture.focus is not None]
-        return tuple(sorted(focused, key=lambda picture: picture.focus or 0.0))
+        return tuple(sorted(filter(_in_stack, self.pictures), key=lambda picture: picture.focus or 0.0))
+
+    @cached_property
+    def others(self) -> tuple[StoredPicture, ...]:
+        """The pictures that are not of the refocus stack."""
+        return tuple(picture for picture in self.pictures if not _in_stack(picture))
 
 
 def read_contents(container: Container) -> Contents:
     """List what the container holds. Raises InputError for damaged metadata."""
     capture = read_capture(container)
-    pictures, maps, files = tuple(_pictures(container)), tuple(_maps(container)), tuple(_files(container))
+    pictures = tuple(islice(_pictures(container), _MAX_PICTURES + 1))
+    maps, files = tuple(_maps(container)), tuple(_files(container))
+    if len(pictures) > _MAX_PICTURES:
+        raise InputError(f"{container.path} claims more than {_MAX_PICTURES} pictures, which no camera writes; it is damaged.")
     stored = Contents(Kind.UNKNOWN, capture, pictures, maps, files)
     return Contents(_kind(stored), capture, pictures, maps, files)
+
+
+def _in_stack(picture: StoredPicture) -> bool:
+    return picture.label == _STACK and picture.focus is not None
 
 
 def _kind(stored: Contents) -> Kind:

@@ -6,6 +6,7 @@ import io
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import av
@@ -30,6 +31,9 @@ _MAX_SCANS = 64
 
 # Bytes per pixel while a picture is decoded: the picture, and the coefficients of a progressive JPEG.
 _WORK = 9
+
+# The same for a video: the decoder keeps up to 16 frames of 1.5 bytes a pixel, and the picture.
+_VIDEO_WORK = 27
 
 
 @dataclass(frozen=True)
@@ -73,14 +77,14 @@ def read_extras(container: Container, contents: Contents) -> Extras:
     """Decode everything that can be looked at. Raises InputError for damaged pictures and for too large ones."""
     room = _Room(container)
     stack = _stack(container, contents, room)
-    others = [picture for picture in contents.pictures if picture not in contents.stack]
-    pictures = tuple(zip((picture.label for picture in others), _decode(container, others, room), strict=True))
+    labels = (picture.label for picture in contents.others)
+    pictures = tuple(zip(labels, _pictures(container, contents.others, room), strict=True))
     return Extras(container.path.stem, describe(container, contents), pictures, stack, _depth(container, contents))
 
 
 def decode_pictures(container: Container, pictures: Sequence[StoredPicture]) -> list[Picture]:
     """The pictures, uint8 (H, W, 3), grey ones repeated. Raises InputError as `read_extras` does."""
-    return list(_decode(container, pictures, _Room(container)))
+    return _pictures(container, pictures, _Room(container))
 
 
 def decode_map(container: Container, stored: StoredMap) -> Map:
@@ -106,17 +110,25 @@ class _Room:
         self._left = _ROOM + 4 * container.size
 
     def check(self, width: int, height: int, bytes_per_pixel: int) -> None:
-        """Raise InputError where a picture would not fit."""
+        """Raise InputError where a picture would not fit while it is worked on."""
         if width * height * bytes_per_pixel > self._left:
             raise InputError(
                 f"{self._path} claims pictures too large for its size, one of {width} x {height} px; it is damaged, or they "
                 "are not meant for looking at."
             )
 
-    def take(self, picture: Picture) -> Picture:
-        """Count a decoded picture, and hand it back."""
-        self._left -= picture.nbytes
-        return picture
+    def keep(self, width: int, height: int, count: int) -> None:
+        """Count that many pictures that stay in memory; raise InputError where they do not fit."""
+        self.check(width, height, 3 * count)
+        self._left -= width * height * 3 * count
+
+
+def _pictures(container: Container, stored: Sequence[StoredPicture], room: _Room) -> list[Picture]:
+    found: dict[int, Picture] = {}
+    for index, picture in _decode(container, stored, room):
+        room.keep(picture.shape[1], picture.shape[0], 1)
+        found[index] = picture
+    return [found[index] for index in range(len(stored))]
 
 
 def _stack(container: Container, contents: Contents, room: _Room) -> FocusStack | None:
@@ -124,10 +136,10 @@ def _stack(container: Container, contents: Contents, room: _Room) -> FocusStack 
     if not stored:
         return None
     images: Picture | None = None
-    for index, picture in enumerate(_decode(container, stored, room)):
+    for index, picture in _decode(container, stored, room):
         if images is None:
             height, width = picture.shape[:2]
-            room.check(width, height, 3 * (len(stored) - 1))
+            room.keep(width, height, len(stored))
             images = np.empty((len(stored), height, width, 3), np.uint8)
         if picture.shape != images.shape[1:]:
             raise InputError(f"{container.path} has a refocus stack with pictures of different sizes; the file is damaged.")
@@ -147,17 +159,21 @@ def _depth(container: Container, contents: Contents) -> DepthMap | None:
     )
 
 
-def _decode(container: Container, pictures: Sequence[StoredPicture], room: _Room) -> Iterator[Picture]:
-    """The pictures in the order asked for; each video is decoded once."""
-    videos: dict[Section, list[Picture]] = {}
-    for picture in pictures:
-        if picture.frame is None:
-            yield room.take(_decode_still(container, picture.section, room))
-            continue
-        if picture.section not in videos:
-            count = 1 + max(other.frame or 0 for other in pictures if other.section == picture.section)
-            videos[picture.section] = _decode_video(container, picture.section, count, room)
-        yield videos[picture.section][picture.frame]
+def _decode(container: Container, stored: Sequence[StoredPicture], room: _Room) -> Iterator[tuple[int, Picture]]:
+    """(index in `stored`, picture), section by section: what several share is decoded once, videos frame by frame."""
+    by_section: dict[Section, list[int]] = {}
+    for index, picture in enumerate(stored):
+        by_section.setdefault(picture.section, []).append(index)
+    for section, indices in by_section.items():
+        if all(stored[index].frame is None for index in indices):
+            pixels = _decode_still(container, section, room)
+            yield from ((index, pixels) for index in indices)
+        else:
+            by_frame: dict[int, list[int]] = {}
+            for index in indices:
+                by_frame.setdefault(stored[index].frame or 0, []).append(index)
+            for frame, pixels in _decode_video(container, section, sorted(by_frame), room):
+                yield from ((index, pixels) for index in by_frame[frame])
 
 
 def _decode_still(container: Container, section: Section, room: _Room) -> Picture:
@@ -185,28 +201,28 @@ def _decode_still(container: Container, section: Section, room: _Room) -> Pictur
 
 
 def suffix_of(data: bytes) -> str | None:
-    """".jpg" or ".png" for the beginning of such a picture, else None."""
+    """The suffix ".jpg" or ".png" for the beginning of such a picture, else None."""
     return next((suffix for magic, suffix in _SUFFIXES.items() if data.startswith(magic)), None)
 
 
-def _decode_video(container: Container, section: Section, count: int, room: _Room) -> list[Picture]:
-    """The first `count` frames of an H.264 stream, bare or in MP4."""
+def _decode_video(container: Container, section: Section, wanted: Sequence[int], room: _Room) -> Iterator[tuple[int, Picture]]:
+    """(number, picture) of the wanted frames, in rising order, of an H.264 stream, bare or in MP4."""
     data, source = container.data(section), container.describe(section)
-    frames: list[Picture] = []
+    left = set(wanted)
     try:
         with av.open(io.BytesIO(data), "r", format="mp4" if data[4:8] == b"ftyp" else "h264") as video:
             stream = video.streams.video[0]
             # Every thread would hold frames of its own.
             stream.codec_context.thread_count = 1
-            # The decoder keeps up to 16 frames of 1.5 bytes a pixel.
-            room.check(stream.width, stream.height, 27)
-            for frame in video.decode(stream):
-                room.check(frame.width, frame.height, 3)
-                frames.append(room.take(np.ascontiguousarray(frame.to_ndarray(format="rgb24"))))
-                if len(frames) == count:
-                    break
+            room.check(stream.width, stream.height, _VIDEO_WORK)
+            for number, frame in enumerate(islice(video.decode(stream), max(wanted) + 1)):
+                if number in left:
+                    room.check(frame.width, frame.height, _VIDEO_WORK)
+                    left.remove(number)
+                    yield number, np.ascontiguousarray(frame.to_ndarray(format="rgb24"))
     except (av.FFmpegError, IndexError, ValueError) as error:
         raise InputError(f"{source} is no readable H.264 video where pictures are expected; the file is damaged.") from error
-    if len(frames) < count:
-        raise InputError(f"{source} has {len(frames)} of {count} pictures; it is cut off or damaged: copy the file again.")
-    return frames
+    if left:
+        raise InputError(
+            f"{source} has {len(wanted) - len(left)} of {len(wanted)} pictures; it is cut off or damaged: copy the file again."
+        )

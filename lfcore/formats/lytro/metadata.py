@@ -18,6 +18,9 @@ from lfcore.formats.lytro.fields import Fields
 # Larger mosaics than any camera's; what is asked for memory later is bounded by this.
 MAX_SIDE = 20_000
 
+# One, as far as is known.
+_MAX_FRAMES = 16
+
 Quad = tuple[float, float, float, float]
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
@@ -119,7 +122,7 @@ class Capture:
     raw: RawImage
     lenslets: LensletGeometry
     facts: CaptureFacts
-    image: Section | None = None  # the packed mosaic
+    image: Section | None = None  # the packed mosaic, of the length that `raw` says
     modulation: Section | None = None  # a white image in the file itself
     modulation_metadata: Section | None = None
     geometry_reference: str | None = None  # name of the geometry correction that belongs to the white image
@@ -128,15 +131,22 @@ class Capture:
 
 def read_capture(container: Container) -> Capture | None:
     """The first frame that has metadata, preferably with its mosaic; None where no frame has. Raises InputError."""
-    captures = [capture for frame in frames(container) if (capture := _frame_capture(container, frame)) is not None]
-    return next((capture for capture in captures if capture.image), captures[0] if captures else None)
+    first: Capture | None = None
+    for frame in frames(container):
+        capture = _frame_capture(container, frame)
+        if capture is not None and capture.image is not None:
+            return capture
+        first = first or capture
+    return first
 
 
 def frames(container: Container) -> list[Fields]:
-    """The objects that describe the frames, of either generation's table of contents."""
+    """The objects that describe the frames, of either generation's table of contents. Raises InputError."""
     table = container.table
-    entries = [*table.child("picture").children("frameArray"), *table.child("master", "picture").children("frameArray")]
-    return [entry.child("frame") for entry in [*entries, *table.children("frames")]]
+    entries = [*table.child("picture").children("frameArray"), *table.children("frames")]
+    if len(entries) > _MAX_FRAMES:
+        raise InputError(f"{container.path} claims {len(entries)} frames, but a camera writes one; the file is damaged.")
+    return [entry.child("frame") for entry in entries]
 
 
 def frame_in_text(table: Fields) -> Capture:
@@ -152,11 +162,18 @@ def _frame_capture(container: Container, frame: Fields) -> Capture | None:
     if not public:
         return None
     capture = capture_of(public, _document(container, frame, "privateMetadata"), Fields({}, public.source))
+    image = container.find(frame.text("imageRef"))
+    if image is not None and image.length != capture.raw.length:
+        raw = capture.raw
+        raise InputError(
+            f"{container.describe(image)} holds {image.length:,} bytes, but a mosaic of {raw.width} x {raw.height} px in "
+            f"{raw.packing.bits} bits takes {raw.length:,}; the file is damaged."
+        )
     return Capture(
         raw=capture.raw,
         lenslets=capture.lenslets,
         facts=capture.facts,
-        image=container.find(frame.text("imageRef")),
+        image=image,
         modulation=container.find(frame.text("modulationDataRef")),
         modulation_metadata=container.find(frame.text("modulationDataMetadataRef")),
         geometry_reference=frame.text("geometryCorrectionRef"),
