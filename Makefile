@@ -14,7 +14,16 @@ OUT := out
 WINDOW_PACKAGES := libgl1 libegl1 libgl1-mesa-dri libglx-mesa0 libx11-6 libxext6 libxrandr2 libxinerama1 libxcursor1 libxi6 libxrender1 libxkbcommon0
 TEST_PACKAGES := xvfb xdotool
 
-.PHONY: run test lint clean window-packages test-packages
+# What the shipped weights are made from: folders of light fields to train on and to hold out, and photographs (docs/training.md).
+DATA ?= ../shared/data
+TEXTURES ?= textures
+WEIGHTS ?= $(OUT)/weights
+# Captures as a Lytro Illum's own software stores them are three of twenty; they count three times.
+TRAINING = $(DATA)/train $(foreach name,IMG_0288 bikes_4 bikes_11,$(DATA)/train/$(name) $(DATA)/train/$(name))
+TRAIN = $(PYTHON) -m app train --data $(TRAINING) --val $(DATA)/val --generated 300 --textures $(TEXTURES) \
+	--generated-share 0.4 --tones 0.35 --balance 0.75
+
+.PHONY: run test weights lint clean window-packages test-packages
 
 run: $(VENV)/ready window-packages
 	@if [ -n "$${DISPLAY:-}$${WAYLAND_DISPLAY:-}" ] || [ "$$(uname -s)" = Darwin ]; then \
@@ -30,6 +39,13 @@ test: $(VENV)/ready-for-tests window-packages test-packages
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
 	$(PYTHON) -m pytest
+
+# The small pair first, since it teaches the paper's pair. Each goes on where it was stopped.
+weights: $(VENV)/ready
+	mkdir -p $(WEIGHTS)
+	$(TRAIN) --model realtime --out $(WEIGHTS)/realtime.safetensors $(REALTIME)
+	$(TRAIN) --model full --out $(WEIGHTS)/full.safetensors --teacher $(WEIGHTS)/realtime.safetensors $(FULL)
+	$(TRAIN) --model single --out $(WEIGHTS)/single.safetensors $(SINGLE)
 
 lint: $(VENV)/ready-for-tests
 	$(VENV)/bin/ruff check .

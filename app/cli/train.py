@@ -66,6 +66,9 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--lr", type=positive, metavar="R", default=1e-4, help="learning rate (default: 1e-4)")
     parser.add_argument("--decay", type=share, metavar="F", default=0.3, help="last share of the steps, of a falling rate")
     parser.add_argument(
+        "--average", type=share, metavar="F", default=0.999, help="decay of the running average of the weights (0.999)"
+    )
+    parser.add_argument(
         "--balance", type=share, metavar="F", default=0.0, help="0: the paper's loss (default); to 1: dark patches weigh more"
     )
     parser.add_argument(
@@ -163,6 +166,7 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         learning_rate=options.lr,
         decay_share=options.decay,
         loss=LossConfig(options.matching, options.matching_weight, options.teacher_weight, options.balance),
+        average=options.average,
         seed=options.seed,
         generated_share=options.generated_share,
         patches=patches,
