@@ -54,13 +54,30 @@ def test_a_capture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [section["kind"] for section in found["sections"]].count("LFM") == 1
 
 
-def test_calibration_can_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_calibration_is_named_once_and_remembered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_illum(tmp_path / "a.LFR")
     place = tmp_path / "elsewhere"
     place.mkdir()
     write_caldata(place / "caldata-1.tar", white_files({"MOD_0004": (103, 490, 700)}))
     assert json.loads(info(capsys, path, "--json"))["white_image"]["rule"] == "none"
-    assert json.loads(info(capsys, path, "--json", "--calibration", place))["white_image"]["rule"] == "nearest"
+    calibration: tuple[object, ...] = ("--calibration", place)
+    for _ in ("named", "remembered"):
+        assert json.loads(info(capsys, path, "--json", *calibration))["white_image"]["rule"] == "nearest"
+        calibration = ()
+
+
+def test_calibration_that_cannot_be_remembered_is_still_used(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    path = write_illum(tmp_path / "a.LFR")
+    (tmp_path / "elsewhere").mkdir()
+    write_caldata(tmp_path / "elsewhere" / "caldata-1.tar", white_files({"MOD_0004": (103, 490, 700)}))
+    assert main(["info", str(path), "--calibration", str(tmp_path / "elsewhere")]) == 0
+    output = capsys.readouterr()
+    assert "MOD_0004.RAW, the nearest" in output.out
+    assert "not remembered" in output.err
 
 
 @real_files

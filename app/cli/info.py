@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.cli.calibration import add_calibration, keep
 from app.cli.common import Verbs, add_light_field, add_verb, open_with_progress, write_json
 from app.progress import Progress
 from lfcore.errors import InputError
@@ -21,12 +22,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser = add_verb(verbs, name, "say what a light field or a Lytro file holds", "lfview info capture.png")
     add_light_field(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of text")
-    parser.add_argument(
-        "--calibration",
-        type=Path,
-        metavar="PATH",
-        help="where to look for the white image of a Lytro capture: caldata-*.tar, data.C.0, or a folder",
-    )
+    add_calibration(parser)
     parser.add_argument(
         "--extract",
         type=Path,
@@ -59,6 +55,7 @@ def _run_lytro(options: argparse.Namespace) -> int:
     choice = None
     if contents.capture is not None and contents.kind is Kind.CAPTURE:
         choice = choose_white_image(container, contents.capture, options.calibration)
+        keep(options.calibration)
     if options.json:
         write_json(report.as_json(container, contents, choice), "-")
     else:
