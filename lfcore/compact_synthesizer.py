@@ -12,7 +12,7 @@ from lfcore.allocator import keep_freed_memory
 from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
-from lfcore.planesweep import Levels, Window, inner_plane_sweep, luminance
+from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, fastest_dtype, never, picture
 from lfcore.tone import root_tone, stored_from_root
 from lfcore.warp import quick_warp
@@ -64,7 +64,7 @@ class CompactSynthesizer:
         clock = Clock()
         with torch.inference_mode(), torch.autocast("cpu", dtype=torch.bfloat16, enabled=self.dtype == torch.bfloat16):
             check_cancelled(cancelled)
-            features = inner_plane_sweep(self._luma, offsets, levels, half)  # (1, 2 L, H' / 2, W' / 2)
+            features = plane_sweep(self._luma, offsets, levels, half)  # (1, 2 L, H' / 2, W' / 2)
             clock.lap("features")
             check_cancelled(cancelled)
             disparity = self._model.disparity(features)  # (1, 1, H', W')

@@ -1,8 +1,8 @@
 """The plane sweep: the inputs warped at each of L fixed disparities, as mean and standard deviation (paper, Eqs. 4 and 5).
 
-A warp by one disparity is a shift by one constant per input and level, so it needs no gather: four taps along x, then four
-along y. Samples outside the picture do not count; where none counts, mean and deviation are 0, and where only one counts,
-the deviation is 0 (authors' code).
+A warp by one disparity is a shift by one constant per input and level, so it needs no gather: four taps along one axis, then
+four along the other. Samples outside the picture do not count; where none counts, mean and deviation are 0, and where only
+one counts, the deviation is 0 (authors' code).
 """
 
 from __future__ import annotations
@@ -60,71 +60,132 @@ class Window:
         return self.bottom - self.top, self.right - self.left
 
 
+# A block of the sweep (rows x columns x levels of one input) should stay in the cache of a core or two.
+_BLOCK_VALUES = 2**19
+_BLOCK_LEVELS = 16
+
+
 def plane_sweep(
     luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor | None = None
 ) -> Tensor:
     """Features of the disparity network at one viewpoint, over a window of the picture.
 
     luma: (N, B, H, W) float32, luminance of the N inputs of B light fields that share the viewpoint. offsets: (N, 2), p_i - q
-    of each input, (u, v). Returns (B, 2 L, h, w) float32: the L means, then the L standard deviations (with N - 1). `out`
-    of that shape and any float type takes the result and saves its allocation; beside it, N + 2 planes of the window.
+    of each input, (u, v). Returns (B, 2 L, h, w) float32 in torch's channels_last order, which the networks want: the L means,
+    then the L standard deviations (with N - 1). `out` of that shape, of any float type and order, takes the result in place
+    of a new tensor. Beside it, memory for N + 4 blocks of _BLOCK_VALUES.
     """
-    h, w = window.shape
     if out is None:
-        out = torch.empty(luma.shape[1], 2 * levels.count, h, w, device=luma.device)
-    for level, shifted in enumerate(shifted_inputs(luma, offsets, levels, window)):
-        mean, deviation = _mean_and_deviation(shifted, (luma.shape[1], h, w), luma.device)
-        out[:, level] = mean
-        out[:, levels.count + level] = deviation
+        shape = (luma.shape[1], 2 * levels.count, *window.shape)
+        out = torch.empty(shape, device=luma.device, memory_format=torch.channels_last)
+    means, deviations = out.split(levels.count, 1)
+    values = levels.values().double()
+    for first in range(0, levels.count, _BLOCK_LEVELS):
+        chosen = slice(first, first + _BLOCK_LEVELS)
+        shifts = [(values[chosen] * across, values[chosen] * down) for across, down in offsets.tolist()]
+        for block, whole in _blocks(window, _valid_for_all(shifts, window, luma.shape[-2:]), shifts[0][0].numel()):
+            shifted = [_shift_all(image, across, down, block) for image, (across, down) in zip(luma, shifts, strict=True)]
+            counted = None if whole else [_counts(across, down, block, luma) for across, down in shifts]
+            mean, deviation = _mean_and_deviation(shifted, counted)
+            rows = slice(block.top - window.top, block.bottom - window.top)
+            columns = slice(block.left - window.left, block.right - window.left)
+            means[:, chosen, rows, columns] = mean
+            deviations[:, chosen, rows, columns] = deviation
     return out
 
 
-def inner_plane_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window) -> Tensor:
-    """`plane_sweep` for a window all of whose samples lie inside the pictures; three times as fast.
+def _shift_all(image: Tensor, across: Tensor, down: Tensor, window: Window) -> Tensor:
+    """One input (B, H, W) at several shifts (L,), px: (B, L, h, w), channels_last. What lies beyond its edge repeats the edge.
 
-    All levels of an input are shifted at once by two convolutions, along x and along y, whose kernels hold the four taps of
-    each level at its place: most of their weights are 0, and still they beat one small operation per level and tap. Returns
-    (B, 2 L, h, w) float32 in torch's channels_last order, which the networks want. Memory: 6 L planes of the window.
+    The shifts along y are one matrix product, whose weights hold the four taps of each level at their places, those along x
+    one convolution of the same kind. Most of the weights are 0, and still this takes a fraction of the time that one small
+    operation per level and tap does.
     """
-    shifted = [_shift_all(image, offset, levels, window) for image, offset in zip(luma, offsets.tolist(), strict=True)]
-    b, count, h, w = shifted[0].shape
-    out = torch.empty(b, 2 * count, h, w, device=luma.device, memory_format=torch.channels_last)
+    h, w = window.shape
+    (first_x, taps_x), (first_y, taps_y) = _level_taps(across), _level_taps(down)
+    rows, columns = h + taps_y.shape[1] - 1, w + taps_x.shape[1] - 1
+    source = _edge_slice(_edge_slice(image, -2, window.top + first_y, rows), -1, window.left + first_x, columns)
+    moved = source.unfold(-2, taps_y.shape[1], 1) @ taps_y.T.to(image.device)  # (B, h, columns, L)
+    return F.conv2d(moved.permute(0, 3, 1, 2), taps_x[:, None, None, :].to(image.device), groups=len(across))
+
+
+def _level_taps(shifts: Tensor) -> tuple[int, Tensor]:
+    """The taps of each shift side by side: where the first lies from the output's place, and weights (L, K) float32."""
+    whole = shifts.floor()
+    first, last = int(whole.min()) - 1, int(whole.max()) + 2
+    taps = torch.zeros(len(shifts), last - first + 1, dtype=torch.float64)
+    places = (whole.long() - 1 - first).unsqueeze(1) + torch.arange(4)
+    taps.scatter_(1, places, cubic_taps(shifts - whole))
+    return first, taps.float()
+
+
+def _mean_and_deviation(shifted: list[Tensor], counted: list[Tensor] | None) -> tuple[Tensor, Tensor]:
+    """Mean and standard deviation (N - 1) over the inputs (B, L, h, w), or over those that count at each place.
+
+    torch.std_mean over a leading dimension is 15 times slower than this. The inputs are overwritten.
+    """
+    if counted is not None:
+        for part, counts in zip(shifted, counted, strict=True):
+            part.mul_(counts)
     mean = shifted[0] + shifted[1]
     for part in shifted[2:]:
         mean.add_(part)
-    mean.mul_(1 / len(shifted))
-    out[:, :count] = mean
-    squares = shifted[0].sub_(mean).square_()
-    for part in shifted[1:]:
+    if counted is None:
+        mean.mul_(1 / len(shifted))
+    else:
+        number = torch.stack(counted).sum(0)
+        mean.div_(number.clamp(min=1))
+    for part in shifted:
         part.sub_(mean)
+    if counted is not None:
+        for part, counts in zip(shifted, counted, strict=True):
+            part.mul_(counts)
+    squares = shifted[0].square_()
+    for part in shifted[1:]:
         squares.addcmul_(part, part)
-    torch.sqrt(squares.mul_(1 / (len(shifted) - 1)), out=squares)
-    out[:, count:] = squares
-    return out
+    squares = squares.mul_(1 / (len(shifted) - 1)) if counted is None else squares.div_((number - 1).clamp(min=1))
+    return mean, squares.sqrt_()
 
 
-def _shift_all(image: Tensor, offset: Sequence[float], levels: Levels, window: Window) -> Tensor:
-    """One input (B, H, W) at all levels: (B, L, h, w), channels_last."""
-    (first_x, across), (first_y, down) = (_level_taps(part, levels, image.device) for part in offset)
-    top, left = window.top + first_y, window.left + first_x
-    h, w = window.shape
-    rows, columns = h + down.shape[1] - 1, w + across.shape[1] - 1
-    if min(top, left) < 0 or top + rows > image.shape[1] or left + columns > image.shape[2]:
-        raise ValueError(f"samples of {window} lie outside the picture of {tuple(image.shape[1:])}")
-    source = image[:, None, top : top + rows, left : left + columns]
-    moved = F.conv2d(source, across[:, None, None, :]).contiguous(memory_format=torch.channels_last)
-    return F.conv2d(moved, down[:, None, :, None], groups=levels.count)
+def _counts(across: Tensor, down: Tensor, window: Window, luma: Tensor) -> Tensor:
+    """1 where a sample of the shifted input lies inside its picture, else 0: (1, L, h, w), channels_last.
+
+    Output s reads position s + shift; it counts where 0 <= s + shift <= size - 1.
+    """
+    height, width = luma.shape[-2:]
+    x = torch.arange(window.left, window.right) + across[:, None]  # (L, w)
+    y = torch.arange(window.top, window.bottom) + down[:, None]
+    inside_x, inside_y = (x >= 0) & (x <= width - 1), (y >= 0) & (y <= height - 1)
+    both = (inside_y.T[:, None] & inside_x.T).float()  # (h, w, L)
+    return both.permute(2, 0, 1)[None].to(luma.device)
 
 
-def _level_taps(offset: float, levels: Levels, device: torch.device) -> tuple[int, Tensor]:
-    """The taps of every level's shift side by side: where the first lies from the output's place, and weights (L, K)."""
-    shifts = levels.values().double() * offset
-    whole = shifts.floor()
-    first, last = int(whole.min()) - 1, int(whole.max()) + 2
-    taps = torch.zeros(levels.count, last - first + 1, dtype=torch.float64)
-    places = (whole.long() - 1 - first).unsqueeze(1) + torch.arange(4)
-    taps.scatter_(1, places, cubic_taps(shifts - whole))
-    return first, taps.float().to(device)
+def _valid_for_all(shifts: Sequence[tuple[Tensor, Tensor]], window: Window, size: Sequence[int]) -> Window:
+    """The part of a window in which every shift of every input has a sample; its stops are not before its starts."""
+    height, width = size
+    left = max(window.left, *(math.ceil(-float(across.min())) for across, _ in shifts))
+    right = min(window.right, *(math.floor(width - 1 - float(across.max())) + 1 for across, _ in shifts))
+    top = max(window.top, *(math.ceil(-float(down.min())) for _, down in shifts))
+    bottom = min(window.bottom, *(math.floor(height - 1 - float(down.max())) + 1 for _, down in shifts))
+    if right <= left or bottom <= top:  # nowhere: an empty part at the window's beginning
+        return Window(window.top, window.top, window.left, window.left)
+    return Window(top, bottom, left, right)
+
+
+def _blocks(window: Window, inner: Window, levels: int) -> Iterator[tuple[Window, bool]]:
+    """A window in blocks that suit the cache, and of each whether it belongs to the inner part; a frame surrounds that."""
+    parts = (
+        (inner, True),
+        (Window(window.top, inner.top, window.left, window.right), False),
+        (Window(inner.bottom, window.bottom, window.left, window.right), False),
+        (Window(inner.top, inner.bottom, window.left, inner.left), False),
+        (Window(inner.top, inner.bottom, inner.right, window.right), False),
+    )
+    for part, whole in parts:
+        w = part.right - part.left
+        rows = max(_BLOCK_VALUES // max(w * levels, 1), 1)
+        for top in range(part.top, part.bottom, rows) if w else ():
+            yield Window(top, min(top + rows, part.bottom), part.left, part.right), whole
 
 
 def matching_disparity(
@@ -218,28 +279,3 @@ def _taps(source: Tensor, dim: int, taps: tuple[float, float, float, float], len
     for k in (1, 2, 3):
         out.add_(source.narrow(dim, k, length), alpha=taps[k])
     return out
-
-
-def _mean_and_deviation(
-    shifted: list[Shifted], shape: tuple[int, int, int], device: torch.device
-) -> tuple[Tensor, Tensor]:
-    """Mean and standard deviation (N - 1) at each pixel over the inputs that are valid there: both (B, h, w)."""
-    if len(shifted) > 1 and all(part.image.shape == shape for part in shifted):  # all valid: by far the commonest case
-        # torch.std_mean over a leading dimension is 15 times slower than this.
-        mean = shifted[0].image + shifted[1].image
-        for part in shifted[2:]:
-            mean.add_(part.image)
-        mean.mul_(1 / len(shifted))
-        squares = (shifted[0].image - mean).square_()
-        for part in shifted[1:]:
-            difference = part.image - mean
-            squares.addcmul_(difference, difference)
-        return mean, squares.mul_(1 / (len(shifted) - 1)).sqrt_()
-    total, count, squares = (torch.zeros(shape, device=device) for _ in range(3))
-    for part in shifted:
-        total[(slice(None), *part.window)] += part.image
-        count[(slice(None), *part.window)] += 1
-    mean = total / count.clamp(min=1)
-    for part in shifted:
-        squares[(slice(None), *part.window)] += (part.image - mean[(slice(None), *part.window)]).square_()
-    return mean, (squares / (count - 1).clamp(min=1)).sqrt_()

@@ -1,7 +1,8 @@
 """Cubic interpolation and the backward warp by a disparity map (paper, Eq. 3 and the derivative of Section 3.3).
 
 The kernel is Keys' cubic with a = -0.5, as in the authors' code. `torch.nn.functional.grid_sample` has a = -0.75 built in,
-which is why the warp is written out here. The sign of disparity is defined by `source_offset`, here and nowhere else.
+which is why the warp is put together here from bilinear samples. The sign of disparity is defined by `source_offset`, here
+and nowhere else.
 """
 
 from __future__ import annotations
@@ -27,18 +28,6 @@ def cubic_taps(fraction: Tensor) -> Tensor:
     return torch.stack((outer[..., 0], inner[..., 0], inner[..., 1], outer[..., 1]), -1)
 
 
-def cubic_tap_slopes(fraction: Tensor) -> Tensor:
-    """Derivatives of `cubic_taps` with respect to the position: (...) -> (..., 4)."""
-    t = fraction.unsqueeze(-1)
-    a = CUBIC_A
-    near = torch.cat((t, 1 - t), -1)
-    far = torch.cat((1 + t, 2 - t), -1)
-    inner = (3 * (a + 2) * near - 2 * (a + 3)) * near
-    outer = (3 * a * far - 10 * a) * far + 8 * a
-    # Distance grows with the position for the samples to the left, and shrinks for those to the right.
-    return torch.stack((outer[..., 0], inner[..., 0], -inner[..., 1], -outer[..., 1]), -1)
-
-
 def source_offset(input_position: Tensor, novel_position: Tensor) -> Tensor:
     """p_i - q: what one pixel of disparity moves the sampling position in input i by. All (..., 2), ordered (u, v) = (x, y)."""
     return input_position - novel_position
@@ -49,82 +38,77 @@ def backward_warp(
 ) -> Tensor:
     """Sample `image` at s + (p_i - q) D(s), differentiable in the disparity (paper, Eq. 3).
 
-    image: (N, C, H, W) float32. disparity: (N, 1, h, w) float32, px over the full baseline. offset: (N, 2) = p_i - q.
-    origin: (y, x) in `image` of the disparity map's first pixel, where the map covers only a part of the image. Returns
-    (N, C, h, w) float32; what falls outside the picture is 0, as in the authors' code.
+    image: (N, C, H, W) float32. disparity: (N or 1, 1, h, w) float32, px over the full baseline; one map may serve all images.
+    offset: (N, 2) = p_i - q. origin: (y, x) in `image` of the disparity map's first pixel, where the map covers only a part of
+    the image. Returns (N, C, h, w) float32; what falls outside the picture is 0, as in the authors' code.
     """
-    n, _, h, w = disparity.shape
-    device = disparity.device
-    rows = torch.arange(h, device=device, dtype=torch.float32).view(1, h, 1) + origin[0]
-    columns = torch.arange(w, device=device, dtype=torch.float32).view(1, 1, w) + origin[1]
-    d = disparity[:, 0]  # (N, h, w)
-    x = columns + offset[:, 0].view(n, 1, 1) * d
-    y = rows + offset[:, 1].view(n, 1, 1) * d
-    sampled: Tensor = _CubicSample.apply(image, x, y)
-    return sampled
+    _, _, height, width = image.shape
+    x, y = _positions(disparity, offset, origin)
+    inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)  # False for NaN
+    return torch.where(inside.unsqueeze(1), _cubic_sample(image, x, y), 0)
 
 
 def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[int, int] = (0, 0)) -> Tensor:
-    """The same warp by torch's own bicubic sampling: ten times as fast, with a sharper kernel (a = -0.75).
+    """The same warp by torch's own bicubic sampling: twice as fast, with a sharper kernel (a = -0.75).
 
-    For models trained with it, not for the paper's. Arguments as for `backward_warp`; the disparity of one map may serve all
-    N images (1, 1, h, w). What falls outside the picture repeats its edge.
+    For models trained with it, not for the paper's. Arguments as for `backward_warp`. What falls outside
+    the picture repeats its edge.
     """
     _, _, height, width = image.shape
+    x, y = _positions(disparity, offset, origin)
+    grid = torch.stack((_grid(x, width), _grid(y, height)), -1)
+    return F.grid_sample(image, grid, mode="bicubic", padding_mode="border", align_corners=True)
+
+
+def _positions(disparity: Tensor, offset: Tensor, origin: tuple[int, int]) -> tuple[Tensor, Tensor]:
+    """Where to sample, x and y, px: both (N, h, w)."""
     h, w = disparity.shape[-2:]
     n = offset.shape[0]
     d = disparity[:, 0]  # (N or 1, h, w)
     rows = torch.arange(h, device=d.device, dtype=torch.float32).view(1, h, 1) + origin[0]
     columns = torch.arange(w, device=d.device, dtype=torch.float32).view(1, 1, w) + origin[1]
-    x = (columns + offset[:, 0].view(n, 1, 1) * d) * (2 / (width - 1)) - 1  # grid_sample's -1 .. 1
-    y = (rows + offset[:, 1].view(n, 1, 1) * d) * (2 / (height - 1)) - 1
-    return F.grid_sample(image, torch.stack((x, y), -1), mode="bicubic", padding_mode="border", align_corners=True)
+    return columns + offset[:, 0].view(n, 1, 1) * d, rows + offset[:, 1].view(n, 1, 1) * d
 
 
-class _CubicSample(torch.autograd.Function):
-    """Bicubic samples of `image` at (x, y); the gradient goes to the positions, not to the image, which is never trained.
+def _cubic_sample(image: Tensor, x: Tensor, y: Tensor) -> Tensor:
+    """Keys' cubic interpolation of (N, C, H, W) at (x, y), each (N, h, w), as four bilinear samples: (N, C, h, w).
 
-    Rows of four neighbouring pixels are laid side by side once, so that each sample needs four gathers, not sixteen.
+    Between samples 0 and 1 the cubic with a = -0.5 has their values f and central differences m, so that it is a blend of f by
+    the smooth step 3 t^2 - 2 t^3, which is a linear interpolation at another place, plus t (1 - t) ((1 - t) m0 - t m1). Where
+    the signs of m alternate from pixel to pixel, the bracket is, but for its sign, a linear interpolation of m at t.
     """
+    _, _, height, width = image.shape
+    slope_y = _alternating_slope(image, -2)
+    smooth_x, plain_x, weight_x = _axis(x, width)
+    smooth_y, plain_y, weight_y = _axis(y, height)
+    from_values = _bilinear(image, smooth_x, smooth_y) + weight_x * _bilinear(_alternating_slope(image, -1), plain_x, smooth_y)
+    both = _bilinear(_alternating_slope(slope_y, -1), plain_x, plain_y)
+    return from_values + weight_y * (_bilinear(slope_y, smooth_x, plain_y) + weight_x * both)
 
-    @staticmethod
-    def forward(ctx, image: Tensor, x: Tensor, y: Tensor) -> Tensor:  # type: ignore[no-untyped-def]
-        n, c, height, width = image.shape
-        _, h, w = x.shape
-        inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)  # (N, h, w); False for NaN
-        x, y = x.where(inside, 0), y.where(inside, 0)
-        column, row = x.floor(), y.floor()
-        taps_x, taps_y = cubic_taps(x - column), cubic_taps(y - row)  # (N, h, w, 4)
 
-        # (N, H, W, 4, C): at column j the pixels j - 1 .. j + 2. Taps beyond the image repeat its edge.
-        near = torch.arange(-1, 3, device=image.device)
-        neighbours = (torch.arange(width, device=image.device).unsqueeze(1) + near).clamp(0, width - 1)
-        quads = image.permute(0, 2, 3, 1)[:, :, neighbours.flatten()].reshape(n * height * width, 4 * c)
-        base = torch.arange(n, device=image.device).view(n, 1, 1) * (height * width) + column.long()
-        needs_slopes = ctx.needs_input_grad[1] or ctx.needs_input_grad[2]
-        slopes_y = cubic_tap_slopes(y - row) if needs_slopes else None
-        blended = dy = None
-        for k in range(4):
-            line = base + (row.long() + (k - 1)).clamp(0, height - 1) * width
-            quad = quads.index_select(0, line.flatten()).view(n, h, w, 4 * c)
-            weighted = quad * taps_y[..., k : k + 1]
-            blended = weighted if blended is None else blended.add_(weighted)
-            if slopes_y is not None:
-                weighted = quad * slopes_y[..., k : k + 1]
-                dy = weighted if dy is None else dy.add_(weighted)
-        assert blended is not None
-        blended = blended.view(n, h, w, 4, c)
-        mask = inside.unsqueeze(-1)
-        out = (blended * taps_x.unsqueeze(-1)).sum(3) * mask  # (N, h, w, C)
-        if dy is not None:
-            slopes_x = cubic_tap_slopes(x - column)
-            d_dx = (blended * slopes_x.unsqueeze(-1)).sum(3) * mask
-            d_dy = (dy.view(n, h, w, 4, c) * taps_x.unsqueeze(-1)).sum(3) * mask
-            ctx.save_for_backward(d_dx, d_dy)
-        return out.permute(0, 3, 1, 2)
+def _alternating_slope(image: Tensor, dim: int) -> Tensor:
+    """Central differences along a dimension, where the edge is repeated, negative at odd places."""
+    size = image.shape[dim]
+    padded = F.pad(image, (1, 1, 0, 0) if dim == -1 else (0, 0, 1, 1), mode="replicate")
+    signs = 0.5 - torch.arange(size, device=image.device) % 2
+    return (padded.narrow(dim, 2, size) - padded.narrow(dim, 0, size)) * (signs if dim == -1 else signs.unsqueeze(1))
 
-    @staticmethod
-    def backward(ctx, grad: Tensor):  # type: ignore[no-untyped-def]
-        d_dx, d_dy = ctx.saved_tensors  # (N, h, w, C)
-        grad = grad.permute(0, 2, 3, 1)
-        return None, (grad * d_dx).sum(-1), (grad * d_dy).sum(-1)
+
+def _axis(position: Tensor, size: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Of positions along one axis, px: grid_sample's place of the smooth step, its plain place, both (N, h, w), and the weight
+    of the slopes (N, 1, h, w)."""
+    whole = position.detach().floor()
+    t = position - whole
+    weight = t * (1 - t) * (1 - 2 * whole.remainder(2))
+    return _grid(whole + t * t * (3 - 2 * t), size), _grid(position, size), weight.unsqueeze(1)
+
+
+def _grid(position: Tensor, size: int) -> Tensor:
+    """Pixels 0 .. size - 1 as grid_sample wants them, -1 .. 1."""
+    return position * (2 / max(size - 1, 1)) - 1
+
+
+def _bilinear(image: Tensor, grid_x: Tensor, grid_y: Tensor) -> Tensor:
+    return F.grid_sample(
+        image, torch.stack((grid_x, grid_y), -1), mode="bilinear", padding_mode="border", align_corners=True
+    )

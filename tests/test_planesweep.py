@@ -5,7 +5,7 @@ from scenes import plane
 from slow import features as slow_features
 
 from lfcore.lightfield import CORNERS
-from lfcore.planesweep import Levels, Window, inner_plane_sweep, luminance, matching_disparity, plane_sweep
+from lfcore.planesweep import Levels, Window, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor
 
 
@@ -76,14 +76,3 @@ def test_luminance_weighs_the_channels() -> None:
     colours = torch.eye(3).view(3, 3, 1, 1)
     assert luminance(colours).flatten().tolist() == pytest.approx([0.2989, 0.5870, 0.1140])
     assert len(CORNERS) == 4
-
-
-@pytest.mark.parametrize("viewpoint", [(0.4, 0.3), (0.0, 1.0), (1.25, -0.25)])
-def test_the_sweep_by_convolutions_is_the_sweep(viewpoint: tuple[float, float]) -> None:
-    levels = Levels(48, -10.5, 10.5)
-    luma = torch.rand(4, 2, 72, 80, generator=torch.Generator().manual_seed(1))
-    window, offsets = Window(20, 50, 18, 58), corner_offsets(*viewpoint)
-    expected = plane_sweep(luma, offsets, levels, window)
-    torch.testing.assert_close(inner_plane_sweep(luma, offsets, levels, window), expected, atol=2e-6, rtol=1e-5)
-    with pytest.raises(ValueError, match="outside"):
-        inner_plane_sweep(luma, offsets, levels, Window(3, 50, 18, 58))

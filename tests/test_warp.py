@@ -4,7 +4,7 @@ import torch
 from scenes import plane
 from slow import keys_kernel, sample
 
-from lfcore.warp import backward_warp, cubic_tap_slopes, cubic_taps, quick_warp, source_offset
+from lfcore.warp import backward_warp, cubic_taps, quick_warp, source_offset
 
 
 def test_taps_are_the_kernel_of_keys() -> None:
@@ -12,12 +12,6 @@ def test_taps_are_the_kernel_of_keys() -> None:
     expected = [[keys_kernel(t - k) for k in (-1, 0, 1, 2)] for t in fractions.tolist()]
     np.testing.assert_allclose(cubic_taps(fractions).numpy(), expected, atol=1e-12)
     np.testing.assert_allclose(cubic_taps(fractions).sum(-1).numpy(), 1, atol=1e-12)
-
-
-def test_slopes_are_the_derivative_of_the_taps() -> None:
-    fractions, step = torch.linspace(0.01, 0.98, 23, dtype=torch.float64), 1e-6
-    expected = (cubic_taps(fractions + step) - cubic_taps(fractions - step)) / (2 * step)
-    np.testing.assert_allclose(cubic_tap_slopes(fractions).numpy(), expected.numpy(), atol=1e-8)
 
 
 def test_the_warp_equals_a_slow_sampling_by_definition() -> None:
