@@ -8,6 +8,7 @@ microlenses that are not where the hexagonal grid has them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,9 +16,10 @@ import numpy.typing as npt
 import torch
 
 from lfcore.decode.grid import LensGrid, regular_grid
+from lfcore.decode.unpack import Mosaic
 from lfcore.plane_scene import PlaneScene
 
-Mosaic = npt.NDArray[np.uint16]
+Radiance = Callable[[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
 
 # Of the Illum's own metadata: camera colour (white balanced) to linear sRGB; rows sum to 1.
 _MATRIX = ((2.2271547, -1.0552933, -0.1718614), (-0.4269128, 1.7458618, -0.3189489), (-0.2049721, -0.7469925, 1.9519646))
@@ -75,7 +77,7 @@ class CameraModel:
         """Width and height of the sensor in pitches of the microlenses."""
         return self.width / self.grid.pitch, self.height / self.grid.pitch
 
-    def ray(self, px: torch.Tensor, py: torch.Tensor) -> tuple[torch.Tensor, ...]:
+    def ray(self, px: torch.Tensor, py: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """(x, y) in the scene's pitches of places on the sensor in px."""
         pitch = self.grid.pitch
         return (px - (self.width - 1) / 2) / pitch, (py - (self.height - 1) / 2) / pitch
@@ -116,7 +118,7 @@ def white_image(camera: CameraModel, seed: int = 0, level: float = 0.7, samples:
     return _read_out(replace(camera, hot_pixels=0.0), light, seed)
 
 
-def _irradiance(camera: CameraModel, samples: int, radiance) -> torch.Tensor:  # type: ignore[no-untyped-def]
+def _irradiance(camera: CameraModel, samples: int, radiance: Radiance) -> torch.Tensor:
     """Light on each pixel under its own colour filter, (H, W), 1 = white."""
     light = torch.empty(camera.height, camera.width)
     filters = torch.tensor([["RGB".index(camera.cfa[2 * y + x]) for x in range(2)] for y in range(2)])
@@ -126,14 +128,18 @@ def _irradiance(camera: CameraModel, samples: int, radiance) -> torch.Tensor:  #
         top, bottom = max(begin - _HALO, 0), min(end + _HALO, camera.height)
         rows = torch.arange(top, bottom)
         y, x = (axis.contiguous() for axis in torch.meshgrid(rows.float(), columns.float(), indexing="ij"))
-        band = sum(_one_sample(camera, x, y, point, radiance) for point in _rays(samples)) / samples  # (rows, W, 3)
+        band = torch.zeros(len(rows), camera.width, 3)
+        for point in _rays(samples):
+            band += _one_sample(camera, x, y, point, radiance) / samples
         band = _blur(band, camera.crosstalk)[begin - top : end - top]
         channel = filters[torch.arange(begin, end)[:, None] % 2, columns[None] % 2]
         light[begin:end] = torch.gather(band, 2, channel[..., None])[..., 0]
     return light
 
 
-def _one_sample(camera: CameraModel, x, y, point: npt.NDArray[np.float64], radiance) -> torch.Tensor:  # type: ignore[no-untyped-def]
+def _one_sample(
+    camera: CameraModel, x: torch.Tensor, y: torch.Tensor, point: npt.NDArray[np.float64], radiance: Radiance
+) -> torch.Tensor:
     """Light (rows, W, 3) by one ray to each pixel: `point` is its place in the pixel and in the microlens, -0.5 to 0.5."""
     grid = camera.grid
     px, py = x + float(point[0]), y + float(point[1])
@@ -157,7 +163,7 @@ def _nearest_centres(grid: LensGrid, px: torch.Tensor, py: torch.Tensor) -> tupl
         cy = grid.origin[1] + column * grid.along[1] + row * grid.down[1]
         found.append((cx, cy, (cx - px) ** 2 + (cy - py) ** 2))
     first = found[0][2] <= found[1][2]
-    return tuple(torch.where(first, a, b).float() for a, b in zip(found[0][:2], found[1][:2], strict=True))  # type: ignore[return-value]
+    return torch.where(first, found[0][0], found[1][0]).float(), torch.where(first, found[0][1], found[1][1]).float()
 
 
 def _transmission(camera: CameraModel, u: torch.Tensor, v: torch.Tensor) -> torch.Tensor:

@@ -57,20 +57,14 @@ class LensGrid:
         dx, dy = x - self.origin[0], y - self.origin[1]
         across = to_steps[0, 0] * dx + to_steps[0, 1] * dy
         down = to_steps[1, 0] * dx + to_steps[1, 1] * dy
-        best: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] | None = None
-        best_distance = np.full(np.shape(x), np.inf)
-        for candidate in (np.floor(down), np.floor(down) + 1):
-            row = candidate.astype(np.int64)
+        found = []
+        for row in (np.floor(down).astype(np.int64), np.floor(down).astype(np.int64) + 1):
             column = np.rint(across - np.mod(row, 2) / 2).astype(np.int64)
-            distance = np.hypot(*np.moveaxis(self.centres(row, column) - np.stack([x, y], -1), -1, 0))
-            nearer = distance < best_distance
-            if best is None:
-                best = row, column
-            else:
-                best = np.where(nearer, row, best[0]), np.where(nearer, column, best[1])
-            best_distance = np.where(nearer, distance, best_distance)
-        assert best is not None
-        return best
+            away = self.centres(row, column) - np.stack([x, y], axis=-1)
+            found.append((row, column, np.hypot(away[..., 0], away[..., 1])))
+        (row, column, distance), (next_row, next_column, next_distance) = found
+        upper = distance <= next_distance
+        return np.where(upper, row, next_row), np.where(upper, column, next_column)
 
 
 def regular_grid(

@@ -1,10 +1,10 @@
 """Find the grid of microlenses in a white image or a capture.
 
-The pictures of the microlenses are a pattern that repeats in three directions at once. What is brighter
-than its surroundings is cut off, so that the dark rims between the microlenses are left and little of the scene. How strong and where in its period each of
-the three waves is, tile by tile, tells where the microlenses lie, without any of them being looked at alone: noise and the
-scene average out. The waves' rough lengths come from a spectrum of the sensor's middle; a grid with six free numbers (place,
-pitch, rotation, stretch, skew) is then fitted to the tiles, from the middle outwards, outliers weighing little.
+The pictures of the microlenses are a pattern that repeats in three directions at once. Of a capture only the dark rims between
+them are looked at, since they hold little of the scene. How strong and where in its period each of the three waves is, tile by
+tile, tells where the microlenses lie, without any of them being looked at alone: noise and the scene average out. The waves'
+rough lengths come from a spectrum of the sensor's middle; a grid with six free numbers (place, pitch, rotation, stretch, skew)
+is then fitted to the tiles, from the middle outwards, outliers weighing little.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ PITCH_RANGE = 0.04  # the pitch found may differ from the one told by this share
 ROTATION_RANGE = 0.21  # radians
 _TILE_PITCHES = 6  # side of a tile in pitches
 _SPECTRUM_SIDE = 1024  # px of the sensor's middle whose spectrum is looked at
+_FIRST_ROWS, _TILE_ROWS = 12, 24  # of tiles, spread over the sensor; more tell hardly more
 _ROUNDS = 6  # of reweighting
 _PEAK = 3 * math.log(4)  # the three waves together must stand out by this much, in natural logarithms
 # Of a capture only the darkest quarter, by share of the local mean, counts: the rims. In a white image nothing misleads.
@@ -60,9 +61,9 @@ def grid_of_capture(mosaic: npt.NDArray[np.generic], black: float, pitch: float,
 
 def _fit(mosaic: npt.NDArray[np.generic], black: float, pitch: float, row_scale: float, cut: float) -> GridFit:
     start = _from_spectrum(mosaic, black, pitch, row_scale, cut)
-    fit = _fit_tiles(_measure(mosaic, black, start, cut), start)
+    fit = _fit_tiles(_measure(mosaic, black, start, cut, _FIRST_ROWS), start)
     # The tiles' waves were those of the rough grid; once more with the waves of the fitted one.
-    return _fit_tiles(_measure(mosaic, black, fit.grid, cut), fit.grid)
+    return _fit_tiles(_measure(mosaic, black, fit.grid, cut, _TILE_ROWS), fit.grid)
 
 
 def _waves(grid: LensGrid) -> Float64Array:
@@ -127,11 +128,13 @@ class _Tiles:
     weights: Float64Array
 
 
-def _measure(mosaic: npt.NDArray[np.generic], black: float, grid: LensGrid, cut: float) -> _Tiles:
-    """The waves of `grid` in each tile of the mosaic."""
+def _measure(mosaic: npt.NDArray[np.generic], black: float, grid: LensGrid, cut: float, most_rows: int) -> _Tiles:
+    """The waves of `grid` in the tiles of at most `most_rows` rows over the whole mosaic."""
     side = min(round(_TILE_PITCHES * grid.pitch / 2) * 2, min(mosaic.shape) // 6 * 2)
-    down, across = mosaic.shape[0] // side, mosaic.shape[1] // side
-    top, left = (mosaic.shape[0] - down * side) // 4 * 2, (mosaic.shape[1] - across * side) // 4 * 2
+    across = mosaic.shape[1] // side
+    left = (mosaic.shape[1] - across * side) // 4 * 2
+    down = min(mosaic.shape[0] // side, most_rows)
+    tops = np.linspace(0, mosaic.shape[0] - side, down).astype(int) // 2 * 2
     waves = _waves(grid)
     # One wave period more or less in the window's width must not show: the tile is weighted down to nothing at its edges.
     taper = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(side) + 0.5) / side)
@@ -145,7 +148,7 @@ def _measure(mosaic: npt.NDArray[np.generic], black: float, grid: LensGrid, cut:
         along_y = (taper[y::2, None] * np.exp(-2j * np.pi * place[y::2, None] * waves[None, :, 1])).astype(np.complex64)
         basis = np.column_stack([along_x.real, along_x.imag])  # (side / 2, 6)
         for j in range(down):
-            begin = top + j * side
+            begin = int(tops[j])
             above = min(begin // 2, halo // 2)  # rows of this plane
             band = mosaic[begin - 2 * above + y : begin + side + halo + y : 2, x::2].astype(np.float32) - black
             rows = slice(above, above + side // 2), slice(left // 2, (left + across * side) // 2)
@@ -154,7 +157,7 @@ def _measure(mosaic: npt.NDArray[np.generic], black: float, grid: LensGrid, cut:
             mean = band[rows].reshape(side // 2, across, side // 2).mean(axis=(0, 2))
             light[j] = np.minimum(light[j], mean)
     centres = np.stack(
-        np.meshgrid(left + side * (np.arange(across) + 0.5) - 0.5, top + side * (np.arange(down) + 0.5) - 0.5), -1
+        np.meshgrid(left + side * (np.arange(across) + 0.5) - 0.5, tops + side / 2 - 0.5), -1
     )  # (down, across, 2)
     strength = np.abs(total)
     # Nearly dark tiles are noise; of the others, those with a stronger pattern tell more.
