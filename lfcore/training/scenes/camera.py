@@ -45,11 +45,19 @@ class CameraConfig:
 # decodings (train/toys) have about a quarter of it.
 _PALE = np.array([[0.910, 0.078, 0.005], [0.023, 0.939, 0.019], [0.037, 0.072, 0.880]], np.float32)
 
-
 FAULTLESS = CameraConfig(
-    dark_paleness=(0, 0), bright_paleness=(0, 0), misplacement=(0, 0), wandering=(0, 0), gain_deviation=(0, 0), tint_deviation=(0, 0), vignette=(0, 0), shading=(0, 0),
-    outer_blur=(0, 0), shot_noise=(0, 0), read_noise=(0, 0),
-)  # fmt: skip
+    misplacement=(0, 0),
+    wandering=(0, 0),
+    gain_deviation=(0, 0),
+    tint_deviation=(0, 0),
+    dark_paleness=(0, 0),
+    bright_paleness=(0, 0),
+    vignette=(0, 0),
+    shading=(0, 0),
+    outer_blur=(0, 0),
+    shot_noise=(0, 0),
+    read_noise=(0, 0),
+)
 
 
 @dataclass(frozen=True)
