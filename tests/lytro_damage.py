@@ -10,6 +10,7 @@ import random
 import re
 import struct
 from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any
 
 from lfcore.formats.lytro.container import TABLE, reference_to
@@ -18,6 +19,7 @@ from tests.lytro_seeds import Seed
 Parts = list[tuple[bytes, bytes]]  # (kind, data) of sections
 
 _MAX_TEXT = 2**21  # of JSON made
+_MAX_PLACES = 3000  # in a document, of which one is changed
 
 
 def mutate(seed: Seed, chance: random.Random) -> tuple[str, bytes]:
@@ -99,7 +101,7 @@ def _change_json(data: bytes, chance: random.Random) -> bytes:
     document = json.loads(parts[index][1])
     references = [reference_to(part) for _, part in parts] + ["sha1-" + "0" * 40]
     for _ in range(chance.choice((1, 1, 2, 5))):
-        document = _changed(document, chance, references)
+        _change(document, chance, references)
     text = json.dumps(document)
     for name, value in _UNWRITABLE.items():
         text = text.replace(f'"{name}"', value)
@@ -112,30 +114,26 @@ def _change_json(data: bytes, chance: random.Random) -> bytes:
 _UNWRITABLE = {"@inf": "1e999", "@nan": "NaN", "@digits": "9" * 5000, "@deep": "[" * 9000, "@whole": "[" * 9000 + "]" * 9000}
 
 
-def _changed(document: Any, chance: random.Random, references: list[str]) -> Any:
-    """The document with one value, anywhere in it, taken out, exchanged, wrapped, or repeated."""
-    places = list(_places(document))
+def _change(document: Any, chance: random.Random, references: list[str]) -> None:
+    """Take one value, anywhere in the document, out, or exchange, wrap, double or repeat it."""
+    places = list(islice(_places(document), _MAX_PLACES))
     if not places:
-        return document
-    path = chance.choice(places)
-    target = document
-    for step in path[:-1]:
-        target = target[step]
+        return
+    holder, key = chance.choice(places)
     action = chance.randrange(6)
     if action == 0:
-        del target[path[-1]]
-    elif action == 1 and isinstance(target, dict):
-        target[chance.choice(("", "frames", "picture", "width", "x" * 3000, "\ud800\x1b"))] = target[path[-1]]
+        del holder[key]
+    elif action == 1 and isinstance(holder, dict):
+        holder[chance.choice(("", "frames", "picture", "width", "x" * 3000, "\ud800\x1b"))] = holder[key]
     elif action == 2:
         for _ in range(chance.choice((1, 3, 200))):
-            target[path[-1]] = [target[path[-1]]] if chance.random() < 0.5 else {"frame": target[path[-1]]}
+            holder[key] = [holder[key]] if chance.random() < 0.5 else {"frame": holder[key]}
     elif action == 3:
-        target[path[-1]] = chance.choice(references)
-    elif action == 4 and isinstance(target[path[-1]], list):
-        target[path[-1]] = target[path[-1]] * chance.choice((0, 2, 300))
+        holder[key] = chance.choice(references)
+    elif action == 4 and isinstance(holder[key], list):
+        holder[key] = holder[key] * chance.choice((0, 2, 300))
     else:
-        target[path[-1]] = chance.choice(_ODD_VALUES)
-    return document
+        holder[key] = chance.choice(_ODD_VALUES)
 
 
 _ODD_VALUES: list[Any] = [
@@ -146,14 +144,15 @@ _ODD_VALUES: list[Any] = [
 ]
 
 
-def _places(value: Any) -> Iterator[tuple[Any, ...]]:
-    waiting: list[tuple[tuple[Any, ...], Any]] = [((), value)]
+def _places(document: Any) -> Iterator[tuple[Any, Any]]:
+    """(object or list, key or index) of all values in a document."""
+    waiting = [document]
     while waiting:
-        path, node = waiting.pop()
-        items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+        holder = waiting.pop()
+        items = holder.items() if isinstance(holder, dict) else enumerate(holder) if isinstance(holder, list) else ()
         for key, child in items:
-            yield (*path, key)
-            waiting.append(((*path, key), child))
+            yield holder, key
+            waiting.append(child)
 
 
 def _change_data(data: bytes, chance: random.Random) -> bytes:

@@ -93,10 +93,8 @@ def _checksum_fits(block: bytes) -> bool:
     if len(block) < _BLOCK:
         return False
     stored = _number(block[148:156])
-    # The checksum is taken with its own eight bytes as blanks; old writers added the bytes with their signs.
-    rest = block[:148] + b" " * 8 + block[156:]
-    plain = sum(rest)
-    return stored is not None and stored in (plain, plain - 256 * sum(byte > 127 for byte in rest))
+    # The checksum is taken with its own eight bytes as blanks.
+    return stored == sum(block[:148] + b" " * 8 + block[156:])
 
 
 def _number(field: bytes) -> int | None:
