@@ -28,19 +28,21 @@ class Tuning:
     """The numbers of the method, chosen on training scenes. Differences are in units of the root of the brightest tone."""
 
     step: float = 0.5  # px of disparity between two levels
-    ceiling: float = 0.1  # a cost hardly grows beyond it: an occluded input is no worse than a wrong one
-    gradient: float = 1.5  # weight of differences of the gradient
+    ceiling: float = 0.15  # a cost hardly grows beyond it: an occluded input is no worse than a wrong one
+    gradient: float = 2.0  # weight of differences of the gradient
     first_radius: int = 2  # of the box that gives the first disparity, half-size px
     radius: int = 4  # of the guided filter over costs, half-size px
     epsilon: float = 1e-3  # contrast (squared) that the guided filters take for an edge
     trust: float = 2.0  # power of the confidence
-    smooth_radius: int = 4  # of the smoothing of disparity, px
-    disagreement: float = 0.06  # difference from the median at which an input loses two thirds of its weight
+    smooth_radius: int = 3  # of the smoothing of disparity, px
+    disagreement: float = 0.12  # difference from the median at which an input loses two thirds of its weight
 
 
 # The widest sweep, px, and the levels that find out which part of it a light field takes.
 _WIDEST = Levels(count=97, low=-24.0, high=24.0)
-_MARGIN_PX = 1.0  # added to that part on each side
+_SURE = 0.5  # the confidence from which on a pixel tells
+_MARGIN_PX = 1.5  # added to that part on each side
+_OUTERMOST = (0.1, 99.9)  # percentiles that it lies between
 # Rows are worked on in bands of about this many pixels; a band's costs take 0.5 kB a pixel at the most.
 _BAND_PIXELS = 2**19
 _ALONE = 0.05  # deviation that stands for "nothing to compare with"
@@ -57,6 +59,7 @@ class PlaneSweepSynthesizer:
         self._tuning = tuning or Tuning()
         self._corners: Tensor | None = None  # (4, 3, H, W), as stored
         self._toned: Tensor | None = None  # (4, 3, H, W), the root of it, 1 = the brightest tone
+        self._brightest = 1.0
         self._levels = _WIDEST
 
     @property
@@ -68,7 +71,8 @@ class PlaneSweepSynthesizer:
         """See Synthesizer: the root tone, in which noise is even, and the range of disparities are found here."""
         self._corners = corner_tensor(light_field)
         with torch.inference_mode():
-            self._toned = _toned(self._corners)
+            self._brightest = brightest_tone(self._corners)
+            self._toned = _toned(self._corners, self._brightest)
             low, high = disparity_range(self._toned, self._tuning)
         self._levels = Levels(math.ceil((high - low) / self._tuning.step) + 1, low, high)
 
@@ -82,9 +86,9 @@ class PlaneSweepSynthesizer:
         image, disparity, warped = torch.empty(3, height, width), torch.empty(height, width), torch.empty(4, 3, height, width)
         with torch.inference_mode():
             for rows, source in _bands(height, width, self._context):
-                scene = _Scene(self._corners[:, :, source], self._toned[:, :, source], offsets, self._levels, self._tuning)
+                scene = _Scene(self._toned[:, :, source], offsets, self._levels, self._tuning)
                 found = scene.disparity(clock, cancelled)
-                parts = scene.blended(found)
+                parts = scene.blended(self._corners[:, :, source], self._brightest, found)
                 inside = slice(rows.start - source.start, rows.stop - source.start)
                 disparity[rows] = found[inside]
                 image[:, rows], warped[:, :, rows] = parts[0][:, inside], parts[1][:, :, inside]
@@ -102,13 +106,12 @@ class PlaneSweepSynthesizer:
 class _Scene:
     """One band of a light field and one viewpoint."""
 
-    def __init__(self, corners: Tensor, toned: Tensor, offsets: Tensor, levels: Levels, tuning: Tuning) -> None:
-        self._corners, self._toned = corners, toned  # (4, 3, h, w)
-        self._offsets, self._levels, self._tuning = offsets, levels, tuning
+    def __init__(self, toned: Tensor, offsets: Tensor, levels: Levels, tuning: Tuning) -> None:
+        self._toned, self._offsets, self._levels, self._tuning = toned, offsets, levels, tuning  # toned: (4, 3, h, w)
 
     def disparity(self, clock: Clock, cancelled: Callable[[], bool]) -> Tensor:
         """Disparity at the novel view, px over the full baseline: (h, w)."""
-        tuning, (height, width) = self._tuning, self._corners.shape[-2:]
+        tuning, (height, width) = self._tuning, self._toned.shape[-2:]
         volume = cost_volume(self._toned, self._offsets, self._levels, tuning, cancelled)  # (L, 1, h / 2, w / 2)
         clock.lap("features")
         first = _Winner(self._levels)
@@ -122,7 +125,6 @@ class _Scene:
             check_cancelled(cancelled)
             best.take(cost)
         found = best.disparity()
-        clock.lap("disparity")
         guide = self._guide(found)
         trust = best.confidence().pow(tuning.trust)[None, None] + 1e-3
         smooth = _guided(
@@ -131,20 +133,25 @@ class _Scene:
         clock.lap("disparity")
         return (smooth[0, 0] / smooth[1, 0].clamp(min=1e-3)).clamp(self._levels.low, self._levels.high)
 
-    def blended(self, disparity: Tensor) -> tuple[Tensor, Tensor]:
-        """The novel view (3, h, w), as stored, and the warped inputs (4, 3, h, w), 0 outside of them."""
-        warped = backward_warp(self._corners, disparity.expand(4, 1, -1, -1), self._offsets)
-        toned = backward_warp(self._toned, disparity.expand(4, 1, -1, -1), self._offsets)
-        weights = self._weights(toned, disparity)  # (4, 1, h, w)
-        return (warped * weights).sum(0), warped
+    def blended(self, corners: Tensor, brightest: float, disparity: Tensor) -> tuple[Tensor, Tensor]:
+        """The novel view (3, h, w) of the corners as stored, and the warped inputs (4, 3, h, w), 0 outside of them."""
+        warped = self._warped(corners, disparity)
+        weights = self._weights(_toned(warped, brightest), disparity)  # (4, 1, h, w)
+        return (warped * weights).sum(0), warped * self._inside(disparity)
 
     def _guide(self, disparity: Tensor) -> Tensor:
         """Luminance of the blended inputs in the root tone: (1, 1, h, w)."""
-        toned = backward_warp(self._toned, disparity.expand(4, 1, -1, -1), self._offsets)
-        return luminance((toned * self._weights(toned, disparity)).sum(0))[None, None]
+        warped = self._warped(luminance(self._toned).unsqueeze(1), disparity)
+        return (warped * self._weights(warped, disparity)).sum(0, keepdim=True)
+
+    def _warped(self, inputs: Tensor, disparity: Tensor) -> Tensor:
+        """The inputs (4, C, h, w) warped; beyond its edge each is continued by the edge, for places that no input sees."""
+        reach = math.ceil(self._levels.reach * float(self._offsets.abs().max())) + 1
+        padded = F.pad(inputs, (reach,) * 4, mode="replicate")
+        return backward_warp(padded, disparity.expand(4, 1, -1, -1), self._offsets, (reach, reach))
 
     def _weights(self, toned: Tensor, disparity: Tensor) -> Tensor:
-        """Weights of the warped inputs, their sum 1: near ones count more, those that disagree less, outside none."""
+        """Weights of the warped inputs (4, C, h, w), their sum 1: more for near ones, less for those that disagree."""
         near = (1 - self._offsets.abs()).clamp(min=0.05).prod(1).view(4, 1, 1, 1)
         weights = near * self._inside(disparity) + _LEAST_WEIGHT
         ordered = toned.sort(0).values
@@ -184,8 +191,8 @@ def cost_volume(
 def disparity_range(toned: Tensor, tuning: Tuning) -> tuple[float, float]:
     """(lowest, highest) disparity of a light field, px over the full baseline, with a margin; within the widest sweep.
 
-    A sweep at the middle view tells at half size; only pixels whose best level stands out count, and the outermost half per
-    cent on each side does not.
+    A sweep at the middle view tells at half size; only pixels whose best level stands out count, and the outermost
+    thousandth on each side does not.
     """
     half = F.avg_pool2d(toned, 2)  # (4, 3, h / 2, w / 2)
     levels = Levels(_WIDEST.count // 2 + 1, _WIDEST.low / 2, _WIDEST.high / 2)
@@ -193,11 +200,10 @@ def disparity_range(toned: Tensor, tuning: Tuning) -> tuple[float, float]:
     best = _Winner(levels)
     for cost in _box(cost_volume(half, offsets, levels, tuning), 2):
         best.take(cost[0])
-    confidence = best.confidence().flatten()
-    sure = confidence >= max(0.5, float(confidence.median()))
+    sure = best.confidence().flatten() >= _SURE
     if int(sure.sum()) < 100:
         return _WIDEST.low, _WIDEST.high
-    low, high = np.percentile(2 * best.disparity().flatten()[sure].numpy(), (0.5, 99.5)).tolist()
+    low, high = np.percentile(2 * best.disparity().flatten()[sure].numpy(), _OUTERMOST).tolist()
     return max(low - _MARGIN_PX, _WIDEST.low), min(high + _MARGIN_PX, _WIDEST.high)
 
 
@@ -243,10 +249,14 @@ class _Winner:
         return ((mean - self._least) / (mean + 0.005)).clamp(0, 1)
 
 
-def _toned(corners: Tensor) -> Tensor:
-    """The square root of the stored values over the brightest (99th percentile): shot noise is as large everywhere."""
-    brightest = float(np.quantile(corners.numpy()[:, :, ::4, ::4], 0.99))
-    return (corners.clamp(min=0) / max(brightest, 1e-3)).sqrt()
+def brightest_tone(corners: Tensor) -> float:
+    """The 99th percentile of the stored values."""
+    return max(float(np.quantile(corners[:, :, ::4, ::4].numpy(), 0.99)), 1e-3)
+
+
+def _toned(stored: Tensor, brightest: float) -> Tensor:
+    """The square root of stored values over the brightest tone: shot noise is as large everywhere, however dark the capture."""
+    return (stored.clamp(min=0) / brightest).sqrt()
 
 
 def _deviation(shifted: list[Shifted], size: tuple[int, int], gradient: float) -> Tensor:

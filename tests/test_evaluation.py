@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from lfcore.errors import InputError
-from lfcore.evaluation import Evaluation, SceneScore, evaluate_scene, scene_figure, score_table
+from lfcore.evaluation import Evaluation, SceneScore, evaluate_scene, scene_figure, scene_noise, score_table
 from lfcore.lightfield import LightField
-from lfcore.metrics import to_uint8
+from lfcore.metrics import k16, luma_score, to_uint8
+from lfcore.protocols import K16, SEVEN_Y, novel_views
 from lfcore.synthesizer import MeanSynthesizer, Synthesis
 
 
@@ -100,7 +101,7 @@ def test_the_table_lines_up() -> None:
 def test_the_figure_shows_truth_and_synthesis_as_they_are() -> None:
     field = light_field(3, 3)
     result = evaluate_scene(field, Oracle())
-    page = scene_figure(field, result)
+    page = scene_figure(result)
     truth = to_uint8(result.truth)
     # Both pictures are the captured view here, side by side in the first row.
     rows, columns = np.where((page == truth[0, 0]).all(axis=2))
@@ -111,3 +112,43 @@ def test_the_figure_shows_truth_and_synthesis_as_they_are() -> None:
     left, below = places[0][1], places[0][0] + 60
     dark = (page[below:, left : left + 70] == 0).all(axis=2).all(axis=1)
     assert dark.sum() >= 60
+
+
+def test_the_whole_grid_is_scored_view_by_view_and_the_score_stays_that_of_the_protocol() -> None:
+    field = light_field(3, 4)
+    seen: list[int] = []
+    alone = evaluate_scene(field, MeanSynthesizer())
+    result = evaluate_scene(field, MeanSynthesizer(), whole_grid=True, on_view=lambda: seen.append(1))
+    assert (result.score.psnr, result.score.ssim) == (alone.score.psnr, alone.score.ssim)
+    assert len(seen) == len(result.score.views) == 3 * 4 - 4
+    mean = field.corners().mean(0)
+    for view in result.score.views:
+        assert view.psnr == k16(mean, field.view(view.row, view.column)).psnr
+    found = Evaluation("mean", "a machine", (result.score,)).as_json()["scenes"][0]
+    assert found["grid"] == [3, 4]
+    assert {(view["row"], view["column"]) for view in found["views"]} == set(novel_views(field))
+
+
+def test_seven_y_is_the_mean_over_the_views_of_the_first_seven_of_eight() -> None:
+    field = light_field(8, 8)
+    result = evaluate_scene(field, MeanSynthesizer(), SEVEN_Y)
+    corners = [field.view(row, column) for row in (0, 6) for column in (0, 6)]
+    mean = np.mean(corners, axis=0, dtype=np.float32)
+    places = [(r, c) for r in range(7) for c in range(7) if (r, c) not in ((0, 0), (0, 6), (6, 0), (6, 6))]
+    scores = [luma_score(mean, field.view(*place)) for place in places]
+    assert len(scores) == 45
+    assert result.score.psnr == pytest.approx(sum(score.psnr for score in scores) / 45, abs=1e-3)
+    assert result.score.ssim == pytest.approx(sum(score.ssim for score in scores) / 45, abs=1e-5)
+    assert Evaluation("mean", "a machine", (result.score,), SEVEN_Y).as_json()["protocol"] == "7x7-Y"
+
+
+def test_noise_is_measured_at_the_view_that_is_shown() -> None:
+    random = np.random.default_rng(1)
+    views = (0.4 + random.normal(0, 2 / 255, (3, 3, 120, 120, 3))).astype(np.float32)
+    field = LightField(views, "flat", "", "test")
+    noise = scene_noise(field, K16, {"mean": evaluate_scene(field, MeanSynthesizer())})
+    assert noise is not None
+    assert noise.captured[0] == pytest.approx(2, rel=0.05)
+    assert noise.ratio("mean")[0] == pytest.approx(0.5, rel=0.07)
+    textured = light_field(3, 3)
+    assert scene_noise(textured, K16, {"mean": evaluate_scene(textured, MeanSynthesizer())}) is None
