@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.engine import Engine
 from assets import weights_path
+from lfcore.errors import InputError
 from lfcore.lightfield import LightField
 from lfcore.store import ViewStore
 
@@ -17,9 +18,14 @@ if TYPE_CHECKING:
 
 
 def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> LightField:
-    """Open any light field that lfcore can read."""
+    """Open any light field that lfcore can read. Calibration of a Lytro camera is remembered, and an InputError says so."""
+    from lfcore.decode.calibration_files import holds_calibration
+    from lfcore.decode.remembered import remember
     from lfcore.formats import open_light_field
 
+    if holds_calibration(path):
+        remember(path)
+        raise InputError(f"{path} is calibration of a Lytro camera: it is remembered, and used for its captures from now on.")
     return open_light_field(path, progress=progress, cancelled=cancelled)
 
 

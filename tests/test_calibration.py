@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.opening import open_by_content
 from lfcore.decode.calibration import Choice, Rule, choose_white_image
+from lfcore.decode.calibration_files import holds_calibration
 from lfcore.decode.remembered import remember, remembered
 from lfcore.decode.unpack import pack
 from lfcore.errors import InputError
@@ -271,6 +273,21 @@ def test_named_calibration_that_is_none_is_refused(tmp_path: Path, capture: Path
     ):
         with pytest.raises(InputError, match=expected):
             choose(capture, place)
+
+
+def test_calibration_dropped_on_the_window_is_remembered(tmp_path: Path, capture: Path) -> None:
+    folder = save(tmp_path / "a", {"IMG_0001-stk.lfp": b"", "picture.png": b""})
+    assert not holds_calibration(folder)
+    assert not holds_calibration(capture)
+    assert not holds_calibration(tmp_path / "missing")
+    files = white_files(SETTINGS)
+    write_backup(save(tmp_path / "backup", {}), files)
+    for place in (caldata(folder / "caldata-1.tar"), folder, tmp_path / "backup" / "data.C.0", save(tmp_path / "b", files)):
+        assert holds_calibration(place)
+        with pytest.raises(InputError, match="it is remembered, and used for its captures from now on"):
+            open_by_content(place, lambda _: None, lambda: False)
+        assert remembered()[0] == place
+    assert choose(capture).rule is Rule.NEAREST
 
 
 # Archives

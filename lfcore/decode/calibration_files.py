@@ -95,6 +95,18 @@ def sets_beside(path: Path) -> Found:
     return search.found
 
 
+def holds_calibration(path: Path) -> bool:
+    """Whether a file, or a folder or one of its folders, is calibration and no light field."""
+    search = _Search()
+    if path.is_dir():
+        search.folder(path, 1)
+    elif path.is_file() and not _WANTED.fullmatch(path.name.upper()):
+        search.add(lambda: _single(path))
+    else:
+        return path.is_file()
+    return bool(search.sets)
+
+
 class _Search:
     """Gathers sets; what is damaged is noted, not raised, so that it does not hide the rest."""
 
