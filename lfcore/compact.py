@@ -119,6 +119,8 @@ class CompactColour(nn.Module):
         self.blocks = nn.Sequential(*(ResidualBlock(width) for _ in range(config.colour_blocks)))
         self.weights = nn.Conv2d(width, 4 * INPUTS, 3, padding=1)
         self.residual = nn.Conv2d(width, 4 * 3, 3, padding=1)
+        # A straight way past the layers: sharpening and a change of colours are nearly linear, and are learnt here first.
+        self.straight = nn.Conv2d(4 * (3 + 3 * INPUTS) + 4, 4 * 3, 3, padding=1, bias=False)
         self.nearness = nn.Parameter(torch.tensor(0.3))  # how much a near input counts before the network has a say
 
     def forward(self, warped: Tensor, disparity: Tensor, positions: Tensor) -> Tensor:
@@ -132,7 +134,7 @@ class CompactColour(nn.Module):
         range_ = F.max_pool2d(disparity, 6, 2, 2) + F.max_pool2d(-disparity, 6, 2, 2)  # how near an edge of depth is
         x = torch.cat((colours, flat, slope, range_ / 5), 1)
         hidden = F.relu(self.blocks(self.stem(x)))
-        logits, residual = self.weights(hidden), self.residual(hidden)
+        logits, residual = self.weights(hidden), self.residual(hidden) + self.straight(x)
         with torch.autocast(warped.device.type, enabled=False):
             logits = F.pixel_shuffle(logits.float(), 2) + self.nearness * log_nearness(positions)  # (B, 4, h, w)
             weights = logits.softmax(1).unsqueeze(2)
@@ -152,9 +154,10 @@ def initialise_compact(model: CompactModel, seed: int) -> None:
     for module in model.modules():
         if isinstance(module, nn.Conv2d):
             nn.init.kaiming_normal_(module.weight, nonlinearity="relu", generator=generator)
-            assert module.bias is not None
-            nn.init.zeros_(module.bias)
+            if module.bias is not None:
+                nn.init.zeros_(module.bias)
     with torch.no_grad():
+        model.colour.straight.weight.zero_()
         for module in model.modules():
             if isinstance(module, ResidualBlock):
                 module.second.weight *= 0.3
