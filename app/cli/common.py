@@ -47,7 +47,8 @@ def add_model(parser: argparse.ArgumentParser) -> None:
         "--model",
         default="full",
         metavar="NAME",
-        help="full (the paper's two networks, default), mean (average of the corners), or a .safetensors file",
+        help="full (the paper's two networks, default), planesweep (without networks), mean (average of the corners), "
+        "or a .safetensors file",
     )
 
 
