@@ -19,16 +19,18 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from app.cli import bench, cache, evaluate, info, sweep, synth, train, view
+from app.cli import bench, cache, decode, evaluate, generate, info, sweep, synth, train, view
 from lfcore.errors import LfviewError
 
 VERBS = {
     "view": view,
     "info": info,
+    "decode": decode,
     "synth": synth,
     "sweep": sweep,
     "eval": evaluate,
     "train": train,
+    "generate": generate,
     "bench": bench,
     "cache": cache,
 }
@@ -37,10 +39,12 @@ _EXAMPLES = """examples:
   lfview                                      open the viewer on the sample light field
   lfview capture.png                          the same on a light field of yours
   lfview info capture.png
+  lfview decode captures/ --out decoded/
   lfview synth capture.png --uv 0.3,0.7 --out view.png
   lfview sweep capture.png --path circle --frames 60 --fps 30 --out sweep.mp4
   lfview eval scenes/* --model full --model mean --json scores.json --out figures
   lfview train --data training/* --val held_out/* --out weights.safetensors --minutes 60
+  lfview generate --count 12 --textures photographs/ --out scenes/
   lfview bench --json bench.json
   lfview cache --clear
 `lfview VERB --help` tells more."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +86,12 @@ def write_picture(path: str | os.PathLike[str], picture: npt.NDArray[np.uint8]) 
     _write(check_target(path, (".png",)), picture, "uint8", {})
 
 
+def write_stored(path: str | os.PathLike[str], picture: npt.NDArray[np.generic]) -> None:
+    """Write stored values (H, W, 3), uint8 or uint16, as they are: PNG, lightly compressed, for large pictures take long."""
+    target = check_target(path, (".png",))
+    _write(target, picture, "uint8" if picture.dtype == np.uint8 else "uint16", {"png:compressionLevel": 2})
+
+
 def write_disparity(path: str | os.PathLike[str], disparity: FloatArray) -> None:
     """Write a disparity map (H, W), px over the full corner-to-corner baseline: TIFF or EXR, one channel, float32."""
     note = "disparity in pixels over the full corner-to-corner baseline; positive: content moves to larger x as u grows"
@@ -106,11 +112,11 @@ def write_warped(folder: str | os.PathLike[str], warped: FloatArray, extension: 
     return paths
 
 
-def _write(target: Path, values: npt.NDArray[np.generic], stored: str, attributes: dict[str, str]) -> None:
+def _write(target: Path, values: npt.NDArray[np.generic], stored: str, attributes: Mapping[str, str | int]) -> None:
     height, width, channels = values.shape
     spec = oiio.ImageSpec(width, height, channels, stored)
-    for name, text in attributes.items():
-        spec.attribute(name, text)
+    for name, value in attributes.items():
+        spec.attribute(name, value)
     if target.suffix.lower() in (".tif", ".tiff"):
         spec.attribute("compression", "zip")
     with atomic_path(target) as temporary:

@@ -24,6 +24,15 @@ def core_count() -> int:
     return os.cpu_count() or 1
 
 
+def free_memory() -> int:
+    """Bytes of memory that can be taken without pressing others out; a guess of 2 GiB where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
+    except (OSError, StopIteration, ValueError, IndexError):
+        return 2**31
+
+
 def _processor() -> str:
     name = ""
     if sys.platform == "linux":

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,11 @@ from lfcore.decode.demosaic import LensProfile, ViewPlaces, Weights, estimate, w
 from lfcore.decode.grid import LensGrid
 from lfcore.decode.grid_check import check_metadata
 from lfcore.decode.grid_fit import GridFit, GridNotFound, grid_of_capture, grid_of_white_image
+from lfcore.decode.kept import DecodedStore, key_of
 from lfcore.decode.resample import HALF_ROW, PictureGrid, centres_inside, lens_columns, lens_rows, picture_grid, resample
 from lfcore.decode.shading import lens_profile, light_on_pixels, mend_hot_pixels, relative_light
 from lfcore.decode.unpack import Mosaic, unpack
-from lfcore.errors import Cancelled, InputError
+from lfcore.errors import Cancelled, InputError, OutputError
 from lfcore.formats.dark import find_dark_views
 from lfcore.formats.lytro.container import Container, open_container
 from lfcore.formats.lytro.contents import raw_file
@@ -83,12 +85,38 @@ def decode_capture(
     rising shares up to 1, `cancelled` is asked often. Raises InputError where the file is no capture, is damaged or shows no
     microlenses, Cancelled where `cancelled` says so.
     """
-    options = options or DecodeOptions()
     steps = _Steps(progress, cancelled)
     container, capture = _open(Path(path))
+    choice = choose_white_image(container, capture, calibration)
+    return _decode(container, capture, choice, options or DecodeOptions(), steps)
+
+
+def open_capture(
+    path: str | os.PathLike[str],
+    options: DecodeOptions,
+    store: DecodedStore,
+    progress: Callable[[float], None] | None = None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> LightField:
+    """As `decode_capture`, but taken from the store where it was decoded before, and else kept there if that can be done."""
+    steps = _Steps(progress, cancelled)
+    container, capture = _open(Path(path))
+    choice = choose_white_image(container, capture)
+    sections = tuple(section.name for section in container.sections)
+    key = key_of(sections, choice, options)
+    kept = store.get(key)
+    if kept is not None:
+        steps.reach(1.0)
+        return replace(kept, name=container.path.stem, source=str(container.path))
+    light_field = _decode(container, capture, choice, options, steps)
+    with contextlib.suppress(OutputError):  # no room or no permission: it will be decoded again
+        store.put(key, light_field)
+    return light_field
+
+
+def _decode(container: Container, capture: Capture, choice: Choice, options: DecodeOptions, steps: _Steps) -> LightField:
     mosaic = _mosaic(container, capture)
     steps.reach(0.1)
-    choice = choose_white_image(container, capture, calibration)
     mended = mend_hot_pixels(mosaic, capture.raw)
     steps.reach(0.15)
     fit, profile, white = _calibrate(container.path, capture, mosaic, choice)
@@ -106,8 +134,8 @@ def decode_capture(
     views = upright(views, capture.facts.orientation)
     return LightField(
         views=views,
-        name=Path(path).stem,
-        source=str(path),
+        name=container.path.stem,
+        source=str(container.path),
         kind=f"{capture.facts.generation.value} raw",
         facts=_facts(capture, choice, fit, mended, options, sensor),
         warnings=_warnings(choice),

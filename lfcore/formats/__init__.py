@@ -18,7 +18,7 @@ from lfcore.lightfield import LightField
 
 __all__ = ["describe", "open_light_field"]
 
-_KINDS = "an ESLF picture (14 x 14 px per microlens) or a folder with one picture per view"
+_KINDS = "a raw capture (.lfp, .LFR), an ESLF picture (14 x 14 px per microlens) or a folder with one picture per view"
 
 
 def open_light_field(
@@ -28,9 +28,11 @@ def open_light_field(
     progress: Callable[[float], None] | None = None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> LightField:
-    """Open a light field of any kind that is understood: an ESLF picture, a folder of views, or one view of a folder.
+    """Open a light field of any kind that is understood: an ESLF picture, a folder of views, one view of a folder, or a raw
+    capture of a Lytro camera.
 
-    `views` is the side of the middle square of views taken from an ESLF (2 to 14; 8 as in the paper, 14 for all).
+    `views` is the side of the middle square of views taken from an ESLF or a raw capture (2 to 14; 8 as in the paper, 14 for
+    all). Raw captures are decoded with the calibration at hand and kept in this user's cache.
     `progress` is called in the calling thread with rising values up to 1; `cancelled` is asked often. Values keep their
     stored depth. Raises InputError (one sentence) for whatever cannot be opened, Cancelled where `cancelled` says so.
     """
@@ -38,7 +40,8 @@ def open_light_field(
     _check_reachable(path)
     if path.is_dir():
         return views_folder.read(path, progress, cancelled)
-    _refuse_lytro_container(path)
+    if is_container(path):
+        return _open_lytro(path, views, progress, cancelled)
     header = read_header(path)
     check_memory(path, header)
     if eslf.has_camera_size(header):
@@ -66,16 +69,16 @@ def _check_reachable(path: Path) -> None:
         raise InputError(f"{path} is neither a file nor a folder; expected {_KINDS}.")
 
 
-def _refuse_lytro_container(path: Path) -> None:
-    if not is_container(path):
-        return
+def _open_lytro(
+    path: Path, views: int, progress: Callable[[float], None] | None, cancelled: Callable[[], bool]
+) -> LightField:
     container = open_container(path)
     contents = read_contents(container)
-    if contents.kind is Kind.CAPTURE:
-        raise InputError(
-            f"{path} is a Lytro capture, whose raw picture is not decoded yet; export it as ESLF or as a folder of "
-            "views and open that."
-        )
-    raise InputError(
-        f"{describe_container(container, contents).rstrip('.')}; `lfview info --extract DIR` writes out what the file holds."
-    )
+    if contents.kind is not Kind.CAPTURE:
+        what = describe_container(container, contents).rstrip(".")
+        raise InputError(f"{what}; `lfview info --extract DIR` writes out what the file holds.")
+    # The decoder loads torch, which takes a second that other kinds of files need not wait for.
+    from lfcore.decode.kept import default_store
+    from lfcore.decode.pipeline import DecodeOptions, open_capture
+
+    return open_capture(path, DecodeOptions(views), default_store(), progress, cancelled)

@@ -1,0 +1,179 @@
+"""Decoded light fields kept on disk, so that a capture is decoded once: bounded, checked when read, shared by programs.
+
+One file a light field, beside the views that lfcore.store keeps: found by what it was decoded from and by which code, written
+by a rename, removed when it was used longest ago. A file that is not what it should be is removed and counts as never written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lfcore.atomic import atomic_path
+from lfcore.errors import OutputError
+from lfcore.lightfield import LightField
+from lfcore.store import default_root
+
+DEFAULT_LIMIT = 2**30
+_FOLDER = "decoded"
+_SUFFIX = ".lightfield"
+_MAGIC = b"lfview decoded 1\n"
+_HEADER_LIMIT = 2**20
+_DIGEST_BYTES = 16
+_LEFTOVER_SECONDS = 3600.0  # temporary files this old were left by a program that was killed
+
+
+@dataclass(frozen=True)
+class DecodedStore:
+    """Light fields under `folder` (made when first written to), at most `limit_bytes` of them."""
+
+    folder: Path
+    limit_bytes: int = DEFAULT_LIMIT
+
+    def get(self, key: str) -> LightField | None:
+        """The light field under this key; None where there is none, or a damaged one, which is removed."""
+        path = self._path(key)
+        try:
+            with path.open("rb") as file:
+                light_field = _read(file.read(len(_MAGIC) + 4), file, path.stat().st_size)
+        except OSError:
+            return None
+        except (ValueError, KeyError, TypeError):
+            _remove(path)
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(path)
+        return light_field
+
+    def put(self, key: str, light_field: LightField) -> None:
+        """Keep this light field, and remove those used longest ago where there would be too many. Raises OutputError."""
+        header = _header(light_field)
+        size = len(_MAGIC) + 4 + len(header) + light_field.views.nbytes + _DIGEST_BYTES
+        if size > self.limit_bytes:
+            return
+        self._make_room(size)
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # pictures are nobody else's business
+        except OSError as error:
+            raise OutputError(f"Cannot make the folder {self.folder}: {error.strerror or error}.") from error
+        with atomic_path(self._path(key)) as temporary, temporary.open("wb") as file:
+            start = _MAGIC + len(header).to_bytes(4, "little") + header
+            views = np.ascontiguousarray(light_field.views)
+            file.write(start)
+            file.write(views.data)
+            file.write(_digest(start, views))
+
+    def usage(self) -> tuple[int, int]:
+        """(light fields, bytes) that are kept."""
+        files = list(self._files())
+        return len(files), sum(size for _, size, _ in files)
+
+    def clear(self) -> None:
+        """Remove all of them."""
+        for path, _, _ in self._files():
+            _remove(path)
+
+    def _make_room(self, wanted: int) -> None:
+        files = sorted(self._files(), key=lambda file: file[2])
+        excess = sum(size for _, size, _ in files) + wanted - self.limit_bytes
+        for path, size, used_at in files:
+            abandoned = path.name.startswith(".") and time.time() - used_at > _LEFTOVER_SECONDS
+            if excess > 0 or abandoned:
+                _remove(path)
+                excess -= size
+
+    def _files(self) -> Iterator[tuple[Path, int, float]]:
+        """(path, bytes, time of last use) of each file."""
+        with contextlib.suppress(OSError), os.scandir(self.folder) as entries:
+            for entry in entries:
+                with contextlib.suppress(OSError):
+                    facts = entry.stat(follow_symlinks=False)
+                    if entry.name.endswith(_SUFFIX):
+                        yield Path(entry.path), facts.st_size, facts.st_mtime
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}{_SUFFIX}"
+
+
+def default_store() -> DecodedStore:
+    """Where this user's decoded light fields are kept: below lfcore.store.default_root()."""
+    return DecodedStore(default_root() / _FOLDER)
+
+
+def key_of(*parts: object) -> str:
+    """A key for what was decoded from these parts (anything whose repr says all), by the code as it is."""
+    return hashlib.blake2b(repr((parts, _code_digest())).encode(), digest_size=16).hexdigest()
+
+
+@cache
+def _code_digest() -> str:
+    """Digest of the decoder's sources: what other code has decoded is not shown as this program's."""
+    digest = hashlib.blake2b(digest_size=16)
+    for module in sorted(resources.files("lfcore.decode").iterdir(), key=lambda item: item.name):
+        if module.name.endswith(".py"):
+            digest.update(module.name.encode() + module.read_bytes())
+    return digest.hexdigest()
+
+
+def _header(light_field: LightField) -> bytes:
+    facts: dict[str, Any] = {
+        "shape": light_field.views.shape,
+        "type": str(light_field.views.dtype),
+        "name": light_field.name,
+        "source": light_field.source,
+        "kind": light_field.kind,
+        "facts": dict(light_field.facts),
+        "warnings": list(light_field.warnings),
+        "dark": sorted(light_field.dark),
+    }
+    return json.dumps(facts).encode()
+
+
+def _digest(start: bytes, views: npt.NDArray[np.generic]) -> bytes:
+    digest = hashlib.blake2b(start, digest_size=_DIGEST_BYTES)
+    digest.update(views.data)
+    return digest.digest()
+
+
+def _read(opening: bytes, file: Any, size: int) -> LightField:
+    """What `put` wrote. Raises ValueError, KeyError or TypeError for anything else."""
+    length = int.from_bytes(opening[len(_MAGIC) :], "little")
+    if not opening.startswith(_MAGIC) or length > _HEADER_LIMIT:
+        raise ValueError("no decoded light field")
+    header = file.read(length)
+    facts = json.loads(header)
+    shape = tuple(int(side) for side in facts["shape"])
+    dtype = {"uint8": np.dtype(np.uint8), "uint16": np.dtype(np.uint16)}[facts["type"]]
+    values = int(np.prod(shape, dtype=np.int64))
+    if len(shape) != 5 or len(opening) + length + values * dtype.itemsize + _DIGEST_BYTES != size:
+        raise ValueError("of another size")
+    views = np.empty(shape, dtype)
+    file.readinto(views.data)
+    if _digest(opening + header, views) != file.read(_DIGEST_BYTES):
+        raise ValueError("damaged")
+    return LightField(
+        views=views,
+        name=facts["name"],
+        source=facts["source"],
+        kind=facts["kind"],
+        facts=facts["facts"],
+        warnings=tuple(facts["warnings"]),
+        dark=frozenset((int(row), int(column)) for row, column in facts["dark"]),
+    )
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        path.unlink()
