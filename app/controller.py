@@ -15,7 +15,7 @@ from pathlib import Path
 
 from app.engine import Answer, Engine, disparity_range
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
-from app.state import Grid, Look, Point, Readout, Step, ViewState, carried_share
+from app.state import CARRIED_NEAR, Grid, Look, Point, Readout, Step, ViewState, carried_share
 from app.worker import Cancel, Done, Job, LatestWorker
 from lfcore.cache import rounded
 from lfcore.errors import Cancelled
@@ -26,7 +26,7 @@ OpenLightField = Callable[[Path, Progress, Cancel], LightField]
 
 REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
 FADE_SECONDS = 0.1
-STREAM_FADE_SECONDS = 0.06  # while the hand moves, when one synthesis follows the other
+STREAM_FADE_SECONDS = 0.06  # while the hand moves
 QUIET_SECONDS = 0.6  # after the last thing that the person did, views are computed ahead
 # A synthesis for a viewpoint that the hand has left is of use as long as it is not much farther off than the one at hand.
 _FARTHER = 0.02
@@ -329,12 +329,21 @@ class Controller:
         if self.newest is not None and self.share < 1.0:
             self._next = answer
             return
-        if self.picture is None or not self.picture.final:  # otherwise it is the same synthesis, now with its score
+        same = self.picture is not None and self.picture.final  # as on screen, but now with its score
+        if not same and not self._follows_seamlessly(answer):
             self._fade_from = self._now
             self._fade_seconds = FADE_SECONDS if self._resting else STREAM_FADE_SECONDS
         self.newest = answer
         if exact:
             self.picture = answer
+
+    def _follows_seamlessly(self, answer: Answer) -> bool:
+        """Whether the answer can take the place of what is on screen without a fade: one quick synthesis after another,
+        carried a short way, differ by less than can be seen (docs/speed.md), and a fade would only cost time."""
+        newest = self.newest
+        if newest is None or not newest.step is answer.step is Step.REALTIME:
+            return False
+        return math.dist(_viewpoint_of(newest), _viewpoint_of(answer)) <= CARRIED_NEAR
 
     def _follow(self, light_field: LightField) -> None:
         """The viewpoint has moved."""

@@ -45,13 +45,14 @@ class Program:
         self.now += seconds
         self.controller.tick(self.now)
 
-    def until(self, condition: Callable[[], bool]) -> None:
+    def until(self, condition: Callable[[], bool], seconds: float = 0.01) -> None:
+        """Tick until it holds; each tick takes `seconds` of the controller's clock (0: the hand has not come to rest)."""
         deadline = time.monotonic() + PATIENCE
-        self.tick()
+        self.tick(seconds)
         while not condition():
             assert time.monotonic() < deadline
             time.sleep(0.002)
-            self.tick()
+            self.tick(seconds)
 
     def open(self, name: str) -> None:
         self.controller.open(Path(name))
@@ -105,7 +106,7 @@ def test_full_fades_in_when_new_and_is_there_at_once_from_the_cache(program: Pro
 def test_an_answer_for_a_viewpoint_that_was_left_is_not_shown_as_full(program: Program) -> None:
     program.open("3x3")
     program.until_full()
-    program.tick(FADE_SECONDS)
+    program.tick(2 * FADE_SECONDS)
     program.synthesizer.seconds = 0.2
     controller = program.controller
     controller.state.move_to(0.3, 0.3)
@@ -333,12 +334,12 @@ def test_the_quick_model_serves_the_moving_hand_and_the_other_the_resting_one(
     program.until(lambda: controller.step is Step.REALTIME)  # the first picture, too, is the quick one's
     assert program.synthesizer.asked == []
     program.until_full()
-    program.tick(FADE_SECONDS)
+    program.tick(2 * FADE_SECONDS)
     for part in range(1, 6):
         controller.state.move_to(0.5 + 0.01 * part, 0.5)
-        program.until(lambda: controller.picture is not None)
+        program.until(lambda: controller.picture is not None, 0.0)
         assert controller.step is Step.REALTIME
-        program.tick(FADE_SECONDS / 2)
+        program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))  # faded in, and not yet at rest
     assert program.synthesizer.asked == [(0.5, 0.5)]
     program.until_full()
     assert program.synthesizer.asked == [(0.5, 0.5), (0.55, 0.5)]
@@ -353,12 +354,12 @@ def test_a_synthesis_for_the_resting_hand_is_broken_off_as_soon_as_the_hand_move
     controller = program.controller
     program.open("3x3")
     program.until_full()
-    program.tick(FADE_SECONDS)
+    program.tick(2 * FADE_SECONDS)
     program.synthesizer.seconds = 60.0
     controller.state.move_to(0.3, 0.3)
     program.until(lambda: (0.3, 0.3) in program.synthesizer.asked)
     controller.state.move_to(0.31, 0.3)
-    program.until(lambda: (0.31, 0.3) in quick.asked)  # long before the 60 s are over
+    program.until(lambda: (0.31, 0.3) in quick.asked, 0.0)  # long before the 60 s are over
 
 
 def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Program, TruthSynthesizer]) -> None:
@@ -366,11 +367,12 @@ def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Progr
     controller = program.controller
     program.open("3x3")
     program.until_full()
-    program.tick(FADE_SECONDS)
+    program.tick(2 * FADE_SECONDS)
     controller.state.move_to(0.52, 0.5)
     program.tick(0.0)
     assert controller.step is Step.INSTANT  # carried, but not made by the quick model
-    program.until(lambda: controller.picture is not None)
+    program.until(lambda: controller.picture is not None, 0.0)
+    program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))
     quick.seconds = 60.0
     controller.state.move_to(0.54, 0.5)
     program.tick(0.0)
@@ -381,15 +383,12 @@ def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Progr
     assert controller.step is Step.INSTANT  # too far to be carried
 
 
-def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(pair: tuple[Program, TruthSynthesizer]) -> None:
-    program, _ = pair
+def moves_on(program: Program, steps: int) -> list[float]:
+    """Move little by little; when another synthesis came to the screen."""
     controller = program.controller
-    program.open("3x3")
-    program.until_full()
-    program.tick(FADE_SECONDS)
     changed_at = []
     newest = controller.newest
-    for step in range(40):
+    for step in range(steps):
         controller.state.move_to(0.5 + 0.002 * step, 0.5)
         for _ in range(5):
             time.sleep(0.001)
@@ -397,8 +396,32 @@ def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(pair: tuple[Prog
             if controller.newest is not newest:
                 newest = controller.newest
                 changed_at.append(program.now)
+    return changed_at
+
+
+def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(program: Program) -> None:
+    program.open("3x3")
+    program.until_full()
+    program.tick(2 * FADE_SECONDS)
+    changed_at = moves_on(program, 60)
     assert len(changed_at) > 3
     assert min(later - earlier for earlier, later in pairwise(changed_at)) >= STREAM_FADE_SECONDS - 1e-6
+
+
+def test_quick_syntheses_follow_each_other_without_a_fade(pair: tuple[Program, TruthSynthesizer]) -> None:
+    program, _ = pair
+    controller = program.controller
+    program.open("3x3")
+    program.until_full()
+    program.tick(2 * FADE_SECONDS)
+    controller.state.move_to(0.49, 0.5)
+    program.until(lambda: controller.newest is not None and controller.newest.step is Step.REALTIME, 0.0)
+    assert controller.share < 1  # from the one to the other model there is one
+    program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))
+    first = controller.newest
+    controller.state.move_to(0.48, 0.5)
+    program.until(lambda: controller.newest is not first, 0.0)
+    assert controller.share == 1
 
 
 def test_a_quick_model_that_cannot_be_loaded_is_said_and_the_other_serves_alone() -> None:
