@@ -13,8 +13,9 @@ from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
-from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, fastest_dtype, never, picture
+from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
+from lfcore.tuning import machine_tuning
 from lfcore.warp import quick_warp
 
 # How far the inputs are continued beyond their edges, px: 21 px of disparity at a viewpoint 0.25 outside, and the taps.
@@ -38,7 +39,8 @@ class CompactSynthesizer:
     def __init__(self, model: CompactModel, key: str, dtype: torch.dtype | None = None) -> None:
         self.name = model.config.name
         self.key = key
-        self.dtype = dtype or fastest_dtype()
+        self.config = model.config
+        self.dtype = dtype or machine_tuning().dtype
         self._model = model.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._size = 0, 0
         self._toned: Tensor | None = None  # (4, 3, H' + 2 REACH, W' + 2 REACH), root tone
@@ -58,7 +60,7 @@ class CompactSynthesizer:
         if self._toned is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        offsets, levels = corner_offsets(u, v), half_resolution(self._model.config.levels)
+        offsets, levels = corner_offsets(u, v), half_resolution(self.config.levels)
         height, width = (size - 2 * REACH for size in self._toned.shape[2:])
         half = Window(REACH // 2, (REACH + height) // 2, REACH // 2, (REACH + width) // 2)
         clock = Clock()

@@ -10,31 +10,26 @@ from torch import Tensor
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
 from lfcore.networks import SingleModel, single_features
-from lfcore.synthesizer import (
-    TILE,
-    Clock,
-    Synthesis,
-    apply_stack,
-    check_cancelled,
-    corner_tensor,
-    fastest_dtype,
-    never,
-    picture,
-    put,
-    tiles,
-)
+from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_tensor, never, picture, put
+from lfcore.tuned_stack import TunedStack, Tuning
+from lfcore.tuning import machine_tuning
 
 
 class SingleSynthesizer:
     """See lfcore.synthesizer.Synthesizer. There is no disparity and nothing is warped."""
 
-    def __init__(self, model: SingleModel, key: str, dtype: torch.dtype | None = None) -> None:
+    def __init__(self, model: SingleModel, key: str, tuning: Tuning | None = None) -> None:
         self.name = model.config.name
         self.key = key
-        self.dtype = dtype or fastest_dtype()
-        self._stack = model.eval().colour
-        self._stack.hidden.to(dtype=self.dtype, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.config = model.config
+        self._tuning = tuning or machine_tuning()
+        self._stack = TunedStack(model.colour, self._tuning)
         self._inputs: Tensor | None = None  # (1, 12, H, W)
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """The number type of the convolutions."""
+        return self._tuning.dtype
 
     def set_light_field(self, light_field: LightField) -> None:
         self._inputs = corner_tensor(light_field).flatten(0, 1).unsqueeze(0)
@@ -47,10 +42,9 @@ class SingleSynthesizer:
         clock = Clock()
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
-            features = single_features(self._inputs, torch.tensor([[u, v]])).to(self.dtype)
-            for tile, source in tiles(height, width, TILE):
+            features = single_features(self._inputs, torch.tensor([[u, v]]))  # (1, 14, H, W)
+            for tile in self._tuning.tiles(height, width):
                 check_cancelled(cancelled)
-                piece = features[:, :, source.top : source.bottom, source.left : source.right]
-                put(image, tile, apply_stack(self._stack, piece, tile, source))
+                put(image, tile.window, self._stack(self._stack.tile_input(features, tile)))
             clock.lap("colour")
         return Synthesis(u, v, self.name, picture(image[0].clamp_(0, 1)), None, None, clock.timings())

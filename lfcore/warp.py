@@ -12,6 +12,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 CUBIC_A = -0.5
+_BAND_SAMPLES = 2**18  # a warp works on bands of rows of so many samples, so that its temporaries stay small
 
 
 def cubic_taps(fraction: Tensor) -> Tensor:
@@ -78,12 +79,17 @@ def _cubic_sample(image: Tensor, x: Tensor, y: Tensor) -> Tensor:
     the signs of m alternate from pixel to pixel, the bracket is, but for its sign, a linear interpolation of m at t.
     """
     _, _, height, width = image.shape
-    slope_y = _alternating_slope(image, -2)
-    smooth_x, plain_x, weight_x = _axis(x, width)
-    smooth_y, plain_y, weight_y = _axis(y, height)
-    from_values = _bilinear(image, smooth_x, smooth_y) + weight_x * _bilinear(_alternating_slope(image, -1), plain_x, smooth_y)
-    both = _bilinear(_alternating_slope(slope_y, -1), plain_x, plain_y)
-    return from_values + weight_y * (_bilinear(slope_y, smooth_x, plain_y) + weight_x * both)
+    slope_x, slope_y = _alternating_slope(image, -1), _alternating_slope(image, -2)
+    slope_xy = _alternating_slope(slope_y, -1)
+    band = max(_BAND_SAMPLES // (x.shape[0] * x.shape[2]), 1)  # rows
+
+    def sampled(x: Tensor, y: Tensor) -> Tensor:
+        smooth_x, plain_x, weight_x = _axis(x, width)
+        smooth_y, plain_y, weight_y = _axis(y, height)
+        across = _bilinear(image, smooth_x, smooth_y) + weight_x * _bilinear(slope_x, plain_x, smooth_y)
+        return across + weight_y * (_bilinear(slope_y, smooth_x, plain_y) + weight_x * _bilinear(slope_xy, plain_x, plain_y))
+
+    return torch.cat([sampled(*rows) for rows in zip(x.split(band, 1), y.split(band, 1), strict=True)], 2)
 
 
 def _alternating_slope(image: Tensor, dim: int) -> Tensor:

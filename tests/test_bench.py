@@ -13,12 +13,13 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from app.__main__ import main
 from lfcore import bench
+from lfcore.compact import CompactConfig, CompactModel
 from lfcore.errors import OutputError
 from lfcore.export import check_folder, write_picture
-from lfcore.lightfield import LightField
-from lfcore.networks import FullModel, ModelConfig, initialise
+from lfcore.models import Config, build_model
+from lfcore.networks import BORDER, FullModel, ModelConfig, SingleConfig
+from lfcore.operations import network_operations
 from lfcore.planesweep import Levels
-from lfcore.synthesizer import NetworkSynthesizer
 
 SIDE = 32
 
@@ -40,28 +41,37 @@ def test_a_fresh_process_hands_back_results_and_errors() -> None:
         bench.in_fresh_process(check_folder, Path("nowhere"))
 
 
-def test_operations_are_those_of_the_convolutions() -> None:
-    """One tile, float32: each layer's weights once per pixel it puts out, which the padding makes larger than the picture."""
-    model = FullModel(ModelConfig(levels=Levels(count=8)))
-    initialise(model, 1)
-    synthesizer = NetworkSynthesizer(model, "key", dtype=torch.float32)
-    synthesizer.set_light_field(LightField(np.zeros((2, 2, SIDE, SIDE, 3), np.uint8), "test", "", "test"))
-    with FlopCounterMode(display=False) as counter:
-        synthesizer.synthesize(0.5, 0.5)
-    expected = 0
-    for inputs, outputs in ((2 * 8, 1), (15, 3)):
-        first, second, third, last = SIDE + 12 - 6, SIDE + 12 - 10, SIDE, SIDE  # what 7x7, 5x5, 3x3, 1x1 put out
-        expected += first**2 * 49 * inputs * 100 + second**2 * 25 * 100 * 100
-        expected += third**2 * 9 * 100 * 50 + last**2 * 50 * outputs
-    counted = counter.get_flop_counts()["Global"]
-    assert counted[torch.ops.aten.convolution] == 2 * expected
+@pytest.mark.parametrize("config", [ModelConfig(levels=Levels(count=8)), SingleConfig(), CompactConfig(levels=Levels(8))])
+def test_operations_are_those_that_torch_counts_in_the_convolutions(config: Config) -> None:
+    model, wide = build_model(config), SIDE + 2 * BORDER
+    with torch.inference_mode(), FlopCounterMode(display=False) as counter:
+        if isinstance(model, CompactModel):
+            model.disparity(torch.zeros(1, 16, SIDE // 2, SIDE // 2))
+            model.colour(torch.zeros(1, 12, SIDE, SIDE), torch.zeros(1, 1, SIDE, SIDE), torch.zeros(1, 2))
+        elif isinstance(model, FullModel):
+            model.disparity(torch.zeros(1, 16, wide, wide))
+            model.colour(torch.zeros(1, 15, wide, wide))
+        else:
+            model.colour(torch.zeros(1, 14, wide, wide))
+    counted = counter.get_flop_counts()["Global"][torch.ops.aten.convolution]
+    assert sum(network_operations(config, (SIDE, SIDE)).values()) == counted
+
+
+def test_the_paper_s_networks_ask_for_a_third_of_a_billion_products() -> None:
+    """The paper's size: 334 billion multiply-adds a view, and a few more for the border."""
+    assert sum(network_operations(ModelConfig(), (376, 541)).values()) / 2 == pytest.approx(334e9, rel=0.03)
+
+
+def test_higher_ceilings_count_by_type() -> None:
+    assert bench.Ceiling(2.0, 0.5).or_higher(bench.Ceiling(1.0, 0.7)) == bench.Ceiling(2.0, 0.7)
 
 
 def test_bench_writes_the_promised_json(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(bench, "in_fresh_process", lambda function, *arguments: function(*arguments))
-    monkeypatch.setattr(bench, "_MATRIX", 128)
+    monkeypatch.setattr(bench, "_MATRICES", (128,))
+    monkeypatch.setattr(bench, "_CEILING_SECONDS", 0.05)
     out = tmp_path / "bench.json"
     assert main(["bench", str(scene), "--model", "mean", "--count", "3", "--json", str(out)]) == 0
     found = json.loads(out.read_text())
@@ -69,16 +79,22 @@ def test_bench_writes_the_promised_json(
     assert set(found["ceiling_tflops"]) == {"bf16", "fp32"}
     assert all(value > 0 for value in found["ceiling_tflops"].values())
     speed = found["models"]["mean"]
-    assert set(speed) == {"seconds_per_view", "stages", "tflops", "share_of_ceiling", "peak_mib"}
+    assert set(speed) == {"seconds_per_view", "stages", "tflops", "share_of_ceiling", "peak_mib", "networks"}
+    assert speed["networks"] == {}
     assert (speed["tflops"], speed["share_of_ceiling"]) == (None, None)
     assert 50 < speed["peak_mib"] < 10_000
     assert "mean: 0.0" in capsys.readouterr().out
 
 
-def test_the_share_is_that_of_the_type_computed_in() -> None:
-    speed = bench.ModelSpeed(2.0, {"features": 1.5, "warp": 0.5}, 0.3, 0.1, 700.0)
-    text = bench.as_text({**bench.as_json("a machine", bench.Ceiling(3.0, 1.0), {"full": speed}),
+def test_the_share_is_that_of_the_networks_in_the_type_computed_in() -> None:
+    stages = {"features": 0.5, "disparity": 1.0, "warp": 0.25, "colour": 0.25}
+    measured = bench.Measurement(2.0, stages, {"disparity": 5e11, "colour": 5e11}, "fp32", 700.0)
+    speed = measured.speed(bench.Ceiling(bf16=3.0, fp32=1.6))
+    assert speed.tflops == pytest.approx(0.8) and speed.share_of_ceiling == pytest.approx(0.5)
+    assert speed.networks["colour"] == bench.NetworkSpeed(2.0, 1.25)
+    text = bench.as_text({**bench.as_json("a machine", bench.Ceiling(3.0, 1.6), {"full": speed}),
                           "viewer": {"frame_ms_p50": 4.0, "frame_ms_p95": 9.0, "frames": 60, "where": "window"}})  # fmt: skip
-    assert "full: 2.000 s a view (features 1.500, warp 0.500)" in text
-    assert "10% of the ceiling" in text
+    assert "full: 2.000 s a view" in text
+    assert "disparity 1.000 s, 0.500 TFLOP/s, 31% of the ceiling" in text
+    assert "networks together: 0.800 TFLOP/s, 50% of the ceiling" in text
     assert "95 of 100 within 9.0 ms" in text

@@ -9,7 +9,9 @@ from assets import sample_path, weights_path
 from lfcore.formats import open_light_field
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16, k16_view
-from lfcore.synthesizer import MeanSynthesizer, NetworkSynthesizer, Synthesizer
+from lfcore.network_synthesizer import NetworkSynthesizer
+from lfcore.synthesizer import MeanSynthesizer, Synthesizer
+from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
 
 BUTTERCUP = Path(__file__).parents[2] / "shared" / "data" / "val" / "Buttercup"
@@ -45,13 +47,13 @@ def test_they_tell_how_they_were_trained(weights: Weights) -> None:
 def test_bfloat16_costs_no_more_than_a_twentieth_of_a_decibel_and_both_beat_the_mean(path: Path) -> None:
     field = open_light_field(path)
     weights = load_weights(weights_path("full"))
-    exact = score(NetworkSynthesizer(weights.model, "float32", torch.float32), field)
-    short = score(NetworkSynthesizer(load_weights(weights_path("full")).model, "bfloat16", torch.bfloat16), field)
+    exact = score(NetworkSynthesizer(weights.model, "float32", Tuning()), field)
+    short = score(NetworkSynthesizer(weights.model, "bfloat16", Tuning(torch.bfloat16)), field)
     assert abs(exact - short) <= 0.05
     assert min(exact, short) > score(MeanSynthesizer(), field) + 3
 
 
 @pytest.mark.skipif(not BUTTERCUP.is_dir(), reason="the shared test data is not beside the repository")
 def test_the_score_in_the_file_is_the_score_one_gets(weights: Weights) -> None:
-    found = score(NetworkSynthesizer(weights.model, weights.digest, torch.float32), open_light_field(BUTTERCUP))
+    found = score(NetworkSynthesizer(weights.model, weights.digest, Tuning()), open_light_field(BUTTERCUP))
     assert found == pytest.approx(weights.training["k16_psnr"]["Buttercup"], abs=0.05)

@@ -1,4 +1,3 @@
-import copy
 import dataclasses
 
 import numpy as np
@@ -7,9 +6,11 @@ import torch
 from scenes import plane
 
 from lfcore.errors import Cancelled, InputError, WeightsError
+from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel, ModelConfig, initialise
 from lfcore.planesweep import Levels
-from lfcore.synthesizer import MeanSynthesizer, NetworkSynthesizer, corner_tensor, make_synthesizer, reference_synthesis, tiles
+from lfcore.synthesizer import MeanSynthesizer, corner_tensor, make_synthesizer, reference_synthesis
+from lfcore.tuned_stack import Tuning
 
 SIZE = (70, 83)
 
@@ -24,7 +25,11 @@ def small_model() -> FullModel:
 
 
 def float32(model: FullModel, tile: tuple[int, int]) -> NetworkSynthesizer:
-    return NetworkSynthesizer(copy.deepcopy(model), "test", torch.float32, tile)
+    return NetworkSynthesizer(model, "test", tuning(torch.float32, tile))
+
+
+def tuning(dtype: torch.dtype, tile: tuple[int, int]) -> Tuning:
+    return Tuning(dtype, tile[1], 1, tile[0] * tile[1])
 
 
 def test_the_inside_equals_the_reference_without_padding() -> None:
@@ -70,18 +75,21 @@ def test_tiles_leave_no_seams(tile: tuple[int, int]) -> None:
     np.testing.assert_allclose(a.disparity, b.disparity, atol=1e-4)
 
 
-def test_tiles_cover_the_picture_once_and_read_six_pixels_more() -> None:
-    seen = np.zeros((100, 130), int)
-    for tile, source in tiles(100, 130, (40, 50)):
-        seen[tile.top : tile.bottom, tile.left : tile.right] += 1
-        assert source.top == max(tile.top - BORDER, 0) and source.right == min(tile.right + BORDER, 130)
-    assert (seen == 1).all()
+@pytest.mark.parametrize("multiple", [16, 32])
+def test_filled_channels_change_nothing(multiple: int) -> None:
+    model, field = small_model(), plane(3.0, size=SIZE)
+    exact, filled = (NetworkSynthesizer(model, "test", Tuning(torch.float32, 48, m, 48 * 48)) for m in (1, multiple))
+    exact.set_light_field(field)
+    filled.set_light_field(field)
+    a, b = exact.synthesize(0.2, 0.7), filled.synthesize(0.2, 0.7)
+    np.testing.assert_allclose(a.image, b.image, atol=1e-5)
+    np.testing.assert_allclose(a.disparity, b.disparity, atol=1e-4)
 
 
 def test_bfloat16_stays_close_to_float32() -> None:
     model, field = small_model(), plane(3.0, size=SIZE)
     exact = float32(model, (64, 64))
-    short = NetworkSynthesizer(copy.deepcopy(model), "test", torch.bfloat16, (64, 64))
+    short = NetworkSynthesizer(model, "test", tuning(torch.bfloat16, (64, 64)))
     exact.set_light_field(field)
     short.set_light_field(field)
     a, b = exact.synthesize(0.5, 0.5), short.synthesize(0.5, 0.5)

@@ -26,7 +26,7 @@ from lfcore.lightfield import LightField
 from lfcore.metrics import k16, k16_view
 from lfcore.models import Model
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
-from lfcore.synthesizer import corner_offsets, corner_tensor, fastest_dtype, synthesizer_of
+from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
 from lfcore.training.architectures import Batch, architecture
 from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lfcore.training.curve import CurvePoint, write_curve
@@ -35,6 +35,7 @@ from lfcore.training.optimiser import MuonAdam
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, mixed, sample_group
 from lfcore.training.plot import plot
 from lfcore.training.team import ALONE, Team
+from lfcore.tuning import machine_tuning
 from lfcore.weights import Weights, save_weights
 
 
@@ -193,7 +194,7 @@ class Trainer:
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
         self._optimiser = MuonAdam(self._model.parameters(), config.learning_rate)
-        bfloat16 = device.type == "cuda" or fastest_dtype() == torch.bfloat16
+        bfloat16 = device.type == "cuda" or machine_tuning().dtype == torch.bfloat16
         guide = teacher.model.eval().to(device) if teacher and isinstance(teacher.model, CompactModel) else None
         self._loss = team.share(StepLoss(self._model, self._architecture, config.loss, bfloat16, guide))
         self._curve: list[CurvePoint] = []

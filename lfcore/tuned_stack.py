@@ -1,0 +1,133 @@
+"""The paper's stack of layers as it is computed for synthesis: laid out for the machine, in tiles. No weights change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+from lfcore.networks import BORDER, PaperStack
+from lfcore.planesweep import Window
+
+# Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
+TILE_PIXELS = 200 * 288
+_STEP = 16  # widths that are multiples of it suit the blocks in which convolutions are computed
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """How the paper's networks are computed; the type also serves the other networks."""
+
+    dtype: torch.dtype = torch.float32
+    tile_width: int = 272  # px that come out; the height follows from tile_pixels
+    channel_multiple: int = 1  # channels of hidden layers are filled up with zeros to a multiple of this
+    tile_pixels: int = TILE_PIXELS
+
+    def tiles(self, height: int, width: int) -> Iterator[Tile]:
+        """Cover a picture with tiles of about equal size, from the top left."""
+        for top, bottom in _spans(height, max(self.tile_pixels // self.tile_width, _STEP)):
+            for left, right in _spans(width, self.tile_width):
+                yield Tile(Window(top, bottom, left, right), height, width)
+
+
+class Tile:
+    """A part of the picture, and what a PaperStack must see for it: BORDER more on each side.
+
+    Where the picture ends, that border is its mirror image.
+    """
+
+    def __init__(self, window: Window, height: int, width: int) -> None:
+        self.window = window
+        self.source = Window(
+            max(window.top - BORDER, 0),
+            min(window.bottom + BORDER, height),
+            max(window.left - BORDER, 0),
+            min(window.right + BORDER, width),
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width) of the input, with its whole border."""
+        height, width = self.window.shape
+        return height + 2 * BORDER, width + 2 * BORDER
+
+    def inner(self, x: Tensor) -> Tensor:
+        """The part of an input (1, C, *shape) that `source` fills."""
+        top, left = self.source.top - self.window.top + BORDER, self.source.left - self.window.left + BORDER
+        height, width = self.source.shape
+        return x[:, :, top : top + height, left : left + width]
+
+    def mirror(self, x: Tensor) -> None:
+        """Set what lies beyond the picture in an input whose inner part is set."""
+        window, source = self.window, self.source
+        _mirror_edges(x, 2, source.top - window.top + BORDER, window.bottom + BORDER - source.bottom)
+        _mirror_edges(x, 3, source.left - window.left + BORDER, window.right + BORDER - source.right)
+
+
+def _mirror_edges(x: Tensor, dim: int, before: int, after: int) -> None:
+    size = x.shape[dim]
+    x.narrow(dim, 0, before).copy_(x.narrow(dim, before + 1, before).flip(dim))
+    x.narrow(dim, size - after, after).copy_(x.narrow(dim, size - 2 * after - 1, after).flip(dim))
+
+
+def _spans(size: int, most: int) -> list[tuple[int, int]]:
+    count = -(-size // most)
+    even = -(-size // count)
+    rounded = -(-even // _STEP) * _STEP
+    step = rounded if rounded <= most else even
+    return list(pairwise([*range(0, size, step), size]))
+
+
+class TunedStack:
+    """A PaperStack for inference: its hidden layers in the tuned type, in channels_last order, their channels filled.
+
+    A filled channel has weights and bias of 0, so that it stays 0 and no result changes.
+    """
+
+    def __init__(self, stack: PaperStack, tuning: Tuning) -> None:
+        self.dtype = tuning.dtype
+        convolutions = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
+        layers: list[nn.Module] = []
+        for layer in convolutions:
+            layers += [_filled(layer, tuning.channel_multiple), nn.ReLU(inplace=True)]
+        self._channels = convolutions[0].in_channels
+        self._hidden = nn.Sequential(*layers).to(dtype=tuning.dtype, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self._last = stack.last
+        self._outputs = convolutions[-1].out_channels
+
+    def empty_input(self, height: int, width: int) -> Tensor:
+        """Where an input is written: (1, C, height, width) in the layout and type that the first layer wants. The stack's own
+        channels come first and are not set; filled ones are 0."""
+        first = self._hidden[0]
+        assert isinstance(first, nn.Conv2d)
+        x = torch.empty(1, first.in_channels, height, width, dtype=self.dtype, memory_format=torch.channels_last)
+        x[:, self._channels :] = 0
+        return x
+
+    def tile_input(self, features: Tensor, tile: Tile) -> Tensor:
+        """What the stack must see for a tile, of the features (1, channels, H, W) of the whole picture."""
+        source = tile.source
+        x = self.empty_input(*tile.shape)
+        tile.inner(x)[:, : self._channels] = features[:, :, source.top : source.bottom, source.left : source.right]
+        tile.mirror(x)
+        return x
+
+    def __call__(self, x: Tensor) -> Tensor:
+        """An input as `empty_input` makes it to (1, outputs, height - 12, width - 12) float32."""
+        hidden = self._hidden(x)[:, : self._outputs]
+        result: Tensor = self._last(hidden.float())
+        return result
+
+
+def _filled(layer: nn.Conv2d, multiple: int) -> nn.Conv2d:
+    inputs, outputs = (-(-channels // multiple) * multiple for channels in (layer.in_channels, layer.out_channels))
+    kernel = layer.kernel_size
+    filled = nn.utils.skip_init(nn.Conv2d, inputs, outputs, (kernel[0], kernel[1]))
+    assert filled.bias is not None and layer.bias is not None
+    with torch.no_grad():
+        filled.weight.zero_()[: layer.out_channels, : layer.in_channels] = layer.weight
+        filled.bias.zero_()[: layer.out_channels] = layer.bias
+    return filled.requires_grad_(False)

@@ -1,0 +1,166 @@
+"""How convolutions are laid out on this machine: number type, width of tiles, filled channels. Measured once, remembered.
+
+What is fastest differs widely: bfloat16 gains four-fold with AMX and loses without AVX-512; channel counts that are multiples
+of 32 gain three-fold with AMX and lose a quarter without. So the layers that cost most are timed the first time, within
+two seconds or so, and the choice is kept in a file beside the kept views.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import torch
+
+from lfcore.atomic import atomic_path
+from lfcore.errors import OutputError
+from lfcore.networks import BORDER, PaperStack
+from lfcore.tuned_stack import TunedStack, Tuning
+
+_BUDGET_SECONDS = 1.5  # after it, only what has not been timed at all still is
+_ROUNDS = 10  # in turn, and the best of each, so that a busy moment of the machine does not decide
+_PROBE_ROWS = 8
+_WIDTHS = (272, 144, 208, 384, 544)  # what is usual first
+_CHANNELS = (1, 16, 32)
+_KEPT_MACHINES = 32
+_LARGEST_FILE = 100_000  # bytes
+
+
+@lru_cache(maxsize=1)
+def machine_tuning() -> Tuning:
+    """The choice for this machine: the remembered one, else measured and remembered."""
+    with _measuring:
+        return remembered() or retune()
+
+
+_measuring = threading.Lock()  # two threads that measure at once would spoil each other's times
+
+
+def retune() -> Tuning:
+    """Measure anew and remember. Where nothing can be written, the choice lasts as long as the process."""
+    tuning = measured()
+    with contextlib.suppress(OutputError):
+        _remember(tuning)
+    return tuning
+
+
+def measured(widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS) -> Tuning:
+    """Type and filling first, at one width, then the width. The plain choices come first and stay unless another gains
+    clearly: timings are never free of noise, and bfloat16 has to be worth its lost digits."""
+    deadline = time.perf_counter() + _BUDGET_SECONDS
+    exact_kinds = [Tuning(torch.float32, widths[0], multiple) for multiple in channels]
+    short_kinds = [replace(kind, dtype=torch.bfloat16) for kind in exact_kinds]
+    seconds = _fastest(exact_kinds + short_kinds, deadline - _BUDGET_SECONDS / 2)
+    kind = _clearly_least([_clearly_least(kinds, seconds, 0.9) for kinds in (exact_kinds, short_kinds)], seconds, 0.8)
+    shapes = [replace(kind, tile_width=width) for width in widths]
+    per_column = {shape: spent / shape.tile_width for shape, spent in _fastest(shapes, deadline).items()}
+    return _clearly_least(shapes, per_column, 0.93)
+
+
+def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: float) -> Tuning:
+    """The cheapest, if it costs less than `factor` of the first; else the first."""
+    least = min(choices, key=cost.__getitem__)
+    return least if cost[least] < factor * cost[choices[0]] else choices[0]
+
+
+def _fastest(choices: list[Tuning], deadline: float) -> dict[Tuning, float]:
+    """Seconds of a strip of the disparity network's hidden layers, by choice."""
+    seconds = dict.fromkeys(choices, math.inf)
+    with torch.inference_mode():
+        probes = {choice: _probe(choice) for choice in choices}
+        for _ in range(_ROUNDS):
+            for choice, probe in probes.items():
+                if math.isinf(seconds[choice]) or time.perf_counter() < deadline:
+                    seconds[choice] = min(seconds[choice], probe())
+    return seconds
+
+
+def _probe(tuning: Tuning) -> Callable[[], float]:
+    with torch.random.fork_rng(devices=[]):  # its random weights must not shift anybody's sequence
+        stack = TunedStack(PaperStack(200, 1), tuning)
+    x = stack.empty_input(_PROBE_ROWS + 2 * BORDER, tuning.tile_width + 2 * BORDER).zero_()
+
+    def timed() -> float:
+        start = time.perf_counter()
+        stack(x)
+        return time.perf_counter() - start
+
+    return timed
+
+
+def tuning_file() -> Path:
+    """Where choices are kept."""
+    from lfcore.store import default_root
+
+    return default_root() / "tuning.json"
+
+
+def remembered() -> Tuning | None:
+    """This machine's choice, or None where there is none, or a damaged file."""
+    values = _file_content().get(_machine_key(), {})
+    try:
+        return Tuning(
+            _DTYPES[str(values["dtype"])],
+            _within(values["tile_width"], 16, 4096),
+            _within(values["channel_multiple"], 1, 64),
+        )
+    except (KeyError, ValueError):
+        return None
+
+
+_DTYPES = {"float32": torch.float32, "bfloat16": torch.bfloat16}
+
+
+def _within(value: object, low: int, high: int) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        raise ValueError(f"{value!r} is not within {low} to {high}")
+    return value
+
+
+def _remember(tuning: Tuning) -> None:
+    path = tuning_file()
+    others = [item for item in _file_content().items() if item[0] != _machine_key()]
+    newest = dict(others[-_KEPT_MACHINES + 1 :])
+    values = {
+        "dtype": str(tuning.dtype).removeprefix("torch."),
+        "tile_width": tuning.tile_width,
+        "channel_multiple": tuning.channel_multiple,
+    }
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot make the folder {path.parent}: {error.strerror or error}.") from error
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps({**newest, _machine_key(): values}, indent=1), encoding="utf-8")
+
+
+def _file_content() -> Mapping[str, Mapping[str, object]]:
+    try:
+        with tuning_file().open("rb") as file:
+            content = json.loads(file.read(_LARGEST_FILE))
+    except (OSError, ValueError, RecursionError):  # the last: brackets nested without end
+        return {}
+    if not isinstance(content, dict):
+        return {}
+    return {key: values for key, values in content.items() if isinstance(values, dict)}
+
+
+def _machine_key() -> str:
+    """Digest of all that the choice depends on: processor, its instructions, what is allowed of them, threads, torch."""
+    facts = (
+        sorted(torch.cpu.get_capabilities().items()),
+        torch.backends.cpu.get_cpu_capability(),
+        os.environ.get("ONEDNN_MAX_CPU_ISA", ""),
+        torch.get_num_threads(),
+        torch.__version__,
+    )
+    return hashlib.blake2b(repr(facts).encode(), digest_size=16).hexdigest()

@@ -1,0 +1,37 @@
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+
+from lfcore.networks import BORDER, PaperStack
+from lfcore.tuned_stack import TunedStack, Tuning
+
+
+@pytest.mark.parametrize(
+    ("size", "tile"), [((100, 130), (40, 50)), ((376, 541), (200, 288)), ((33, 161), (16, 32)), ((9, 7), (16, 16))]
+)
+def test_tiles_cover_the_picture_once_and_are_no_larger_than_asked(size: tuple[int, int], tile: tuple[int, int]) -> None:
+    seen = np.zeros(size, int)
+    for part in Tuning(tile_width=tile[1], tile_pixels=tile[0] * tile[1]).tiles(*size):
+        window, source = part.window, part.source
+        seen[window.top : window.bottom, window.left : window.right] += 1
+        assert 0 < window.shape[0] <= tile[0] and 0 < window.shape[1] <= tile[1]
+        assert source.top == max(window.top - BORDER, 0) and source.bottom == min(window.bottom + BORDER, size[0])
+        assert source.left == max(window.left - BORDER, 0) and source.right == min(window.right + BORDER, size[1])
+    assert (seen == 1).all()
+
+
+@pytest.mark.parametrize("multiple", [1, 16, 32])
+def test_tiles_of_a_filled_stack_are_parts_of_the_stack_on_the_mirrored_picture(multiple: int) -> None:
+    torch.manual_seed(1)
+    stack, features = PaperStack(5, 2), torch.randn(1, 5, 50, 61)
+    expected = stack(F.pad(features, (BORDER,) * 4, mode="reflect"))
+    tuning = Tuning(torch.float32, 32, multiple, 32 * 20)
+    tuned = TunedStack(stack, tuning)
+    with torch.inference_mode():
+        for tile in tuning.tiles(50, 61):
+            x = tuned.tile_input(features, tile)
+            assert x.is_contiguous(memory_format=torch.channels_last) and x.shape[1] % multiple == 0
+            window = tile.window
+            part = expected[:, :, window.top : window.bottom, window.left : window.right]
+            torch.testing.assert_close(tuned(x), part, atol=1e-5, rtol=1e-5)

@@ -1,0 +1,97 @@
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import torch
+
+from lfcore import tuning
+from lfcore.tuned_stack import Tuning
+
+CHOICE = Tuning(torch.bfloat16, 208, 32)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("LFVIEW_CACHE", str(tmp_path / "cache"))
+    tuning.machine_tuning.cache_clear()
+    yield tmp_path / "cache"
+    tuning.machine_tuning.cache_clear()
+
+
+@pytest.fixture
+def measurements(monkeypatch: pytest.MonkeyPatch) -> list[Tuning]:
+    """What was measured, which is always CHOICE."""
+    made: list[Tuning] = []
+
+    def measured() -> Tuning:
+        made.append(CHOICE)
+        return CHOICE
+
+    monkeypatch.setattr(tuning, "measured", measured)
+    return made
+
+
+def test_what_was_measured_is_remembered(measurements: list[Tuning], folder: Path) -> None:
+    assert tuning.remembered() is None
+    assert tuning.machine_tuning() == CHOICE
+    tuning.machine_tuning.cache_clear()  # as a new process begins
+    assert tuning.machine_tuning() == CHOICE
+    assert len(measurements) == 1
+    assert [path.name for path in folder.iterdir()] == ["tuning.json"]  # nothing else is left behind
+    tuning.retune()
+    assert len(measurements) == 2
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"{", b"[1]", b"\xff\xfe", b'{"KEY": 3}', b'{"KEY": {"dtype": "int8", "tile_width": 208, "channel_multiple": 32}}',
+     b'{"KEY": {"dtype": "float32", "tile_width": 0, "channel_multiple": 1}}', b'{"KEY": {"dtype": "float32"}}',
+     b'{"KEY": {"dtype": "float32", "tile_width": true, "channel_multiple": "1"}}', b"[" * 50_000],
+)  # fmt: skip
+def test_a_damaged_file_counts_as_none_and_is_replaced(content: bytes, measurements: list[Tuning], folder: Path) -> None:
+    folder.mkdir()
+    key = tuning._machine_key()
+    (folder / "tuning.json").write_bytes(content.replace(b"KEY", key.encode()))
+    assert tuning.remembered() is None
+    assert tuning.machine_tuning() == CHOICE
+    assert tuning.remembered() == CHOICE
+
+
+def test_another_machine_measures_for_itself(
+    measurements: list[Tuning], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tuning.machine_tuning()
+    monkeypatch.setenv("ONEDNN_MAX_CPU_ISA", "AVX2")
+    assert tuning.remembered() is None
+    tuning.retune()
+    assert len(json.loads((folder / "tuning.json").read_text())) == 2
+    monkeypatch.delenv("ONEDNN_MAX_CPU_ISA")
+    assert tuning.remembered() == CHOICE
+
+
+def test_a_place_that_cannot_be_written_is_no_hindrance(measurements: list[Tuning], folder: Path) -> None:
+    folder.write_text("a file where the folder should be")
+    assert tuning.machine_tuning() == CHOICE
+    assert folder.read_text() == "a file where the folder should be"
+
+
+def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    def choose(short: float, filled: float, narrow: float) -> Tuning:
+        def seconds(choice: Tuning) -> float:
+            kind = (short if choice.dtype == torch.bfloat16 else 1.0) * (filled if choice.channel_multiple == 16 else 1.0)
+            return kind * choice.tile_width * (narrow if choice.tile_width == 144 else 1.0)
+
+        monkeypatch.setattr(tuning, "_probe", lambda choice: lambda: seconds(choice))
+        return tuning.measured()
+
+    assert choose(0.9, 0.95, 0.97) == Tuning(torch.float32, 272, 1)
+    assert choose(0.5, 0.95, 0.97) == Tuning(torch.bfloat16, 272, 1)
+    assert choose(0.5, 0.7, 0.97) == Tuning(torch.bfloat16, 272, 16)
+    assert choose(0.9, 0.7, 0.6) == Tuning(torch.float32, 144, 16)
+
+
+def test_measuring_takes_a_bounded_time() -> None:
+    """Every choice is timed once even where time is short, so the bound holds for machines of this kind only."""
+    chosen = tuning.measured(widths=(144, 208), channels=(1,))
+    assert chosen.dtype in (torch.float32, torch.bfloat16) and chosen.tile_width in (144, 208)
