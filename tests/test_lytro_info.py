@@ -14,6 +14,7 @@ from lfcore.formats import open_light_field
 from lfcore.formats.lytro.compose import write_backup, write_caldata
 from lfcore.formats.lytro.container import open_container, reference_to, write_container
 from tests.lytro_files import SERIAL, SHARED, white_files, write_illum
+from tests.lytro_seeds import make_seeds
 
 real_files = pytest.mark.skipif(not SHARED.is_dir(), reason="needs the real Lytro files of ../shared/data/lfp")
 
@@ -93,6 +94,17 @@ def test_real_files_are_written_out(tmp_path: Path, capsys: pytest.CaptureFixtur
     picture = oiio.ImageInput.open(str(tmp_path / "out" / "depth_map_00.tif"))
     assert picture.read_image("float").shape == (60, 88, 1)
     assert "lambda" in picture.spec().getattribute("ImageDescription")
+
+
+def test_stacks_stored_as_video_are_written_out_as_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    make_seeds(tmp_path)
+    info(capsys, tmp_path / "video-stk.lfp", "--extract", tmp_path / "out")
+    names = sorted(path.name for path in (tmp_path / "out").glob("*.png"))
+    assert names == ["refocus_stack_00_lambda+2.00.png", "refocus_stack_01_lambda-1.00.png"]
+    # The first frame has no blue, the second some.
+    blue = [oiio.ImageInput.open(str(tmp_path / "out" / name)).read_image("uint8")[..., 2].mean() for name in names]
+    assert blue[0] < 20
+    assert 80 < blue[1] < 120
 
 
 def test_backups_are_written_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
