@@ -20,6 +20,8 @@ from lfcore.training.scenes.textures import Textures, procedural
 
 Range = tuple[float, float]
 
+_STEEPEST = 0.6  # px of disparity per px
+
 
 @dataclass(frozen=True)
 class ContentConfig:
@@ -64,11 +66,11 @@ def arrange(
     canvas: Canvas, textures: Textures, config: ContentConfig, softness: float, rng: np.random.Generator
 ) -> list[Layer]:
     """Draw a scene's layers, from back to front; `softness` px is the camera's own blur."""
-    low, high = _draw_range(config, rng)
+    low, high = draw_range(config, rng)
     count = int(rng.integers(config.layers[0], config.layers[1] + 1))
     material = _draw_material(textures, config, rng)
     drawn = [_draw_shape(k / (count - 1), canvas, rng) for k in range(count)]
-    grids = _draw_surfaces(canvas, drawn, config, rng)
+    grids = _draw_surfaces(canvas, drawn, config, high - low, rng)
     grids = _stretch(canvas, drawn, grids, low, high)
     pictures = [material.draw(canvas.full, rng) * shape.shade.unsqueeze(-1) for shape in drawn]
     pictures = _light(pictures, drawn, rng)
@@ -88,7 +90,8 @@ def arrange(
     return layers
 
 
-def _draw_range(config: ContentConfig, rng: np.random.Generator) -> tuple[float, float]:
+def draw_range(config: ContentConfig, rng: np.random.Generator) -> tuple[float, float]:
+    """Smallest and largest disparity of a scene, px over the full baseline."""
     kind = rng.random()
     if kind < config.lytro_share:
         limit, smallest = 6.0, 2.0
@@ -121,9 +124,9 @@ def _draw_shape(depth: float, canvas: Canvas, rng: np.random.Generator) -> Shape
 
 
 def _draw_surfaces(
-    canvas: Canvas, drawn: list[Shape], config: ContentConfig, rng: np.random.Generator
+    canvas: Canvas, drawn: list[Shape], config: ContentConfig, span: float, rng: np.random.Generator
 ) -> list[Tensor]:
-    """Disparities in units of the scene's range, each thing before all that it covers."""
+    """Disparities in units of the scene's range, `span` px, each thing before all that it covers."""
     count = len(drawn)
     slant = torch.zeros(canvas.coarse)
     if rng.random() < config.slanted_share:
@@ -134,7 +137,10 @@ def _draw_surfaces(
     front = torch.full(canvas.coarse, math.inf)
     grids = []
     for shape, offset in zip(drawn, offsets, strict=True):
-        grid = slant + float(offset) + _own_form(canvas, shape, 1.5 / count, rng)
+        form = _own_form(canvas, shape, 1.5 / count, rng)
+        # No surface may fold over in any view: at 1 px per px it would be seen edge on.
+        form = form * min(1.0, _STEEPEST / max(surfaces.steepness(form) * span, 1e-6))
+        grid = slant + float(offset) + form
         present = _widen(canvas.shrink(shape.alpha) > 0.02)
         # What would stand out behind its background is brought forward as a whole, so that its form stays.
         excess = (grid - front)[present]
@@ -158,7 +164,7 @@ def _own_form(canvas: Canvas, shape: Shape, scale: float, rng: np.random.Generat
         return surfaces.plane(canvas, *(size * rng.normal(0, 1, 2)))
     if kind < 0.85:
         return size * surfaces.waves(canvas, rng)
-    return size * surfaces.cylinder(canvas, rng)
+    return size * surfaces.ridge(canvas, rng)
 
 
 def _widen(mask: Tensor) -> Tensor:
@@ -201,7 +207,7 @@ def _cast_shadows(
         for j in range(max(k - 3, 0), k):
             gap = max(means[j] - means[k], 0) / span
             reach = 2 + 14 * gap
-            shift = int(round(reach * math.sin(angle))), int(round(reach * math.cos(angle)))
+            shift = round(reach * math.sin(angle)), round(reach * math.cos(angle))
             shadow = blur(torch.roll(cover, shift, (0, 1)), 0.6 + 6 * gap)
             shadows[j] = shadows[j] * (1 - depth * max(1 - gap, 0.2) * shadow.clamp(0, 1))
     return [picture * canvas.enlarge(shadow).unsqueeze(-1) for picture, shadow in zip(pictures, shadows, strict=True)]

@@ -27,10 +27,10 @@ class CameraConfig:
     tint_deviation: Range = (0.0, 0.008)  # of the views' red, green and blue, relative
     dark_paleness: Range = (0.4, 1.3)  # how far the corner views of an ESLF's scene lose colour, in units of _PALE
     bright_paleness: Range = (0.0, 0.5)  # those of the gamma-encoded ones, as toolboxes decode them
-    # How much darker the corner views are. Around 0, as in decoded captures: with 0 to 0.12 the networks learnt to brighten every
-    # picture by 4%, which cost half a decibel.
+    # How much darker the corner views are. Around 0, as in decoded captures: with 0 to 0.12 the networks learnt to brighten
+    # every picture by 4%, which cost half a decibel.
     vignette: Range = (-0.015, 0.025)
-    shading: Range = (0.0, 0.10)  # how much the outer views darken towards one side of the picture
+    shading: Range = (0.0, 0.03)  # how much the outer views brighten to one side of the picture and darken to the other
     softness: Range = (0.42, 0.75)  # px, deviation of the blur that all views share
     outer_blur: Range = (0.0, 0.5)  # px, deviation of the blur that corner views have besides
     shot_noise: Range = (2e-5, 6e-4)  # variance per light, drawn evenly in the logarithm
@@ -119,7 +119,8 @@ def expose(light: Tensor, camera: Camera, rng: np.random.Generator) -> npt.NDArr
     table = tone_table(camera.dark)
     stored = np.empty(tuple(light.shape), np.uint8)
     for k in range(len(light)):
-        view = (_soften(light[k], float(camera.blurs[k])).numpy() @ camera.mixing[k].T) * (camera.gains[k] * np.float32(exposure))
+        mixed = _soften(light[k], float(camera.blurs[k])).numpy() @ camera.mixing[k].T
+        view = mixed * (camera.gains[k] * np.float32(exposure))
         view *= _shading(view.shape, camera.shading[k])
         view = add_noise(view, camera.shot_noise, camera.read_noise, rng)
         np.clip(view, 0, 1, out=view)
@@ -149,7 +150,7 @@ def tone_table(dark: bool) -> npt.NDArray[np.uint8]:
 def _shading(shape: tuple[int, ...], slopes: FloatArray) -> FloatArray:
     y = np.linspace(-1, 1, shape[0], dtype=np.float32)[:, None, None]
     x = np.linspace(-1, 1, shape[1], dtype=np.float32)[:, None]
-    shaded: FloatArray = 1 + slopes[0] * x + slopes[1] * y - np.float32(np.abs(slopes).sum())
+    shaded: FloatArray = 1 + slopes[0] * x + slopes[1] * y
     return shaded
 
 

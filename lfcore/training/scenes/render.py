@@ -1,4 +1,4 @@
-"""From layers to views: each layer read at its exact sub-pixel place in each view, laid over what is behind, in linear light."""
+"""From layers to views: each layer read at its exact sub-pixel place and laid over what is behind, in linear light."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from lfcore.training.scenes.sampling import enlarge, read
+from lfcore.training.scenes.sampling import FINENESS, enlarge, read
 from lfcore.training.scenes.surfaces import CELL, Canvas, disparity_in_views
 
 # Coverage from which a layer counts as the front-most surface of a pixel.
@@ -58,8 +58,8 @@ class _Box:
 def render(canvas: Canvas, layers: Sequence[Layer], positions: Tensor, shifts: Tensor) -> Views:
     """Render all views; `layers` from back to front, the first covering everything.
 
-    positions: (N, 2), offsets (u, v) from the middle viewpoint in baselines. shifts: (N, 2) px, by which each view's picture sits
-    aside. The disparity is that of the front-most surface which covers at least half of a pixel.
+    positions: (N, 2), offsets (u, v) from the middle viewpoint in baselines. shifts: (N, 2) px, by which each view's picture
+    sits aside. The disparity is that of the front-most surface which covers at least half of a pixel.
     """
     count = len(positions)
     light = torch.zeros(count, canvas.height, canvas.width, 4)
@@ -95,25 +95,26 @@ def _put_over(canvas: Canvas, layer: Layer, positions: Tensor, shifts: Tensor, l
 
 
 def _present(layer: Layer) -> _Box | None:
-    """The part of the layer that holds anything, with room for its blur, which may lie beyond the layer's edge.
-
-    Its size is one whose Fourier transform is quick.
-    """
+    """The part of the layer that holds anything once it is blurred; it may lie beyond the layer's edge."""
     covered = layer.picture[..., 3] > _FAINT
     rows, columns = covered.any(1).nonzero().flatten(), covered.any(0).nonzero().flatten()
     if not len(rows):
         return None
-    room = math.ceil(4 * layer.blur) + 2
-    top, left = int(rows[0]) - room, int(columns[0]) - room
-    height, width = (math.ceil((int(span[-1]) + 1 - int(span[0]) + 2 * room) / 16) * 16 for span in (rows, columns))
-    return _Box(top, top + height, left, left + width)
+    room = math.ceil(3 * layer.blur) + 3
+    return _Box(int(rows[0]) - room, int(rows[-1]) + 1 + room, int(columns[0]) - room, int(columns[-1]) + 1 + room)
 
 
 def _enlarged(picture: Tensor, part: _Box, sigma: float) -> Tensor:
     """A part of a picture (H, W, C), blurred and enlarged; beyond the picture its edge repeats."""
-    rows = torch.arange(part.top, part.bottom).clamp_(0, picture.shape[0] - 1)
-    columns = torch.arange(part.left, part.right).clamp_(0, picture.shape[1] - 1)
-    return enlarge(picture.index_select(0, rows).index_select(1, columns), sigma)
+    # Opposite edges mix in the Fourier domain: they are cut away afterwards. Multiples of 16 are transformed quickly.
+    spare = math.ceil(3 * sigma) + 5
+    rows, columns = (
+        torch.arange(first - spare, first - spare + math.ceil((end - first + 2 * spare) / 16) * 16).clamp_(0, size - 1)
+        for first, end, size in ((part.top, part.bottom, picture.shape[0]), (part.left, part.right, picture.shape[1]))
+    )
+    whole = enlarge(picture.index_select(0, rows).index_select(1, columns), sigma)
+    first, height, width = FINENESS * spare, FINENESS * (part.bottom - part.top), FINENESS * (part.right - part.left)
+    return whole[:, :, first : first + height, first : first + width]
 
 
 def _reach(canvas: Canvas, layer: Layer, part: _Box, positions: Tensor, shifts: Tensor) -> _Box | None:

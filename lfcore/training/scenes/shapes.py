@@ -1,4 +1,4 @@
-"""Mattes: the outlines of things, with how light falls on them. All are drawn on a layer of (H, W) px with soft, one pixel wide edges."""
+"""Mattes: the outlines of things, one pixel soft, with how light falls on them. All are drawn on a layer of (H, W) px."""
 
 from __future__ import annotations
 
@@ -153,7 +153,9 @@ def branches(shape: tuple[int, int], rng: np.random.Generator) -> Shape:
     strokes: list[Stroke] = []
     for _ in range(int(rng.integers(1, 4))):
         side = rng.random()
-        start = (rng.uniform(0, width), float(height)) if side < 0.5 else (0.0 if side < 0.75 else float(width), rng.uniform(0, height))
+        start = rng.uniform(0, width), float(height)  # from below, or from the left or right
+        if side >= 0.5:
+            start = (0.0 if side < 0.75 else float(width)), rng.uniform(0, height)
         aim = math.atan2(height * rng.uniform(0.1, 0.7) - start[1], width * rng.uniform(0.2, 0.8) - start[0])
         thick = float(np.exp(rng.uniform(math.log(1.2), math.log(12))))
         _grow(strokes, start, aim, thick, max(shape) * rng.uniform(0.5, 1.1), 4, rng)

@@ -1,7 +1,7 @@
 """Surfaces: disparity as a smooth function on the surface, held on a coarse grid over the layer's own plane.
 
-Layers are drawn in the coordinates of the middle viewpoint, with a margin all around. A surface point at p is seen in the view at
-offset d from the middle at s = p + d D(p): positive disparity moves content to larger x as u grows (lfcore.warp).
+Layers are drawn in the coordinates of the middle viewpoint, with a margin all around. A surface point at p is seen in the view
+at offset d from the middle at s = p + d D(p): positive disparity moves content to larger x as u grows (lfcore.warp).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional
 
 CELL = 4  # px between the points of the coarse grid
-_ITERATIONS = 4
+_ITERATIONS = 7
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,8 @@ class Canvas:
     def shrink(self, plane: Tensor) -> Tensor:
         """A plane (H, W) of a layer at the points of the coarse grid."""
         rows, columns = self.coarse
-        padded = functional.pad(
-            plane[None, None], (0, (columns - 1) * CELL + 1 - plane.shape[1], 0, (rows - 1) * CELL + 1 - plane.shape[0]), "replicate"
-        )
+        beyond = (columns - 1) * CELL + 1 - plane.shape[1], (rows - 1) * CELL + 1 - plane.shape[0]
+        padded = functional.pad(plane[None, None], (0, beyond[0], 0, beyond[1]), "replicate")
         shrunk = functional.interpolate(padded, size=(rows, columns), mode="bilinear", align_corners=True)
         return shrunk[0, 0]
 
@@ -79,19 +78,25 @@ def waves(canvas: Canvas, rng: np.random.Generator) -> Tensor:
     return total / 3
 
 
-def cylinder(canvas: Canvas, rng: np.random.Generator) -> Tensor:
+def ridge(canvas: Canvas, rng: np.random.Generator) -> Tensor:
     """A rounded ridge from -1 (along its crest, nearest) to 0 (at its foot), in a random direction."""
     x, y = canvas.coarse_coordinates()
     angle, radius = rng.uniform(0, np.pi), rng.uniform(0.3, 1.0)
     across = (x - rng.uniform(-0.4, 0.4)) * math.cos(angle) + (y - rng.uniform(-0.4, 0.4)) * math.sin(angle)
-    return -torch.sqrt((1 - (across / radius).square()).clamp_min(0) + 0.02)
+    return -torch.cos(np.pi / 2 * (across / radius).clamp(-1, 1)).square()
+
+
+def steepness(surface: Tensor) -> float:
+    """Largest change of a surface per px, along x and y together."""
+    along_x, along_y = surface.diff(dim=1).abs().max(), surface.diff(dim=0).abs().max()
+    return float(along_x + along_y) / CELL
 
 
 def disparity_in_views(canvas: Canvas, surface: Tensor, positions: Tensor, shifts: Tensor) -> Tensor:
     """Disparity of a surface as each view sees it, on the views' own coarse grid: (N, h, w) with points every CELL px.
 
-    surface: coarse grid of the layer. positions: (N, 2) offsets (u, v) from the middle viewpoint, in baselines. shifts: (N, 2) px
-    by which the view's picture sits aside. Solves p = s - d D(p) by fixed point, which converges fast since D varies slowly.
+    surface: coarse grid of the layer. positions: (N, 2) offsets (u, v) from the middle viewpoint, in baselines. shifts: (N, 2)
+    px by which the view's picture sits aside. Solves p = s - d D(p) by fixed point, which converges fast since D varies slowly.
     """
     h, w = canvas.height // CELL + 2, canvas.width // CELL + 2
     s_y = (torch.arange(h) * CELL + canvas.margin).float().view(1, h, 1) - shifts[:, 1].view(-1, 1, 1)

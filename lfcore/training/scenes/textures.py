@@ -89,7 +89,7 @@ def _decode(path: Path) -> ByteArray:
     header = read_header(path)
     check_memory(path, header)
     if min(header.width, header.height) < _SMALLEST_SIDE:
-        raise InputError(f"{path} is {header.size} px; photographs for textures need {_SMALLEST_SIDE} px or more: take it away.")
+        raise InputError(f"{path} is {header.size} px; photographs need {_SMALLEST_SIDE} px each way: take it away.")
     whole = oiio.ImageBuf(str(path))
     factor = min(1.0, LONGEST_SIDE / max(header.width, header.height))
     size = max(round(header.width * factor), 1), max(round(header.height * factor), 1)
