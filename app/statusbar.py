@@ -45,7 +45,7 @@ def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float) -> None:
             right -= width
             _put(part, right, y)
             right -= gap
-        for part in _left_parts(readout):
+        for part in _left_parts(state, readout):
             width = imgui.calc_text_size(part.words).x
             if left + gap + width > right:
                 break
@@ -74,16 +74,17 @@ def _step(state: ViewState, readout: Readout, x: float, y: float) -> float:
     return start + imgui.calc_text_size(words).x
 
 
-def _left_parts(readout: Readout) -> list[_Part]:
+def _left_parts(state: ViewState, readout: Readout) -> list[_Part]:
     parts = []
     if readout.busy:
         parts.append(_Part(readout.busy, "What the synthesis thread is doing now"))
-    parts.append(_Part(f"model {readout.model}", "The model that synthesizes"))
+    parts.append(_Part(f"model {readout.model}", "The model that synthesizes when the hand rests"))
     used, limit = readout.cache_bytes / 2**20, readout.cache_limit / 2**20
+    ahead = "are computed ahead" if state.foresight else "are not computed ahead"
     parts.append(
         _Part(
             f"cache {used:.0f} of {limit:.0f} MiB, {len(readout.cached)} views, {readout.cache_hits} hits",
-            "Viewpoints seen before are kept in memory and shown at once",
+            f"Views at hand in memory are shown at once; while nothing else is to be done, more {ahead}  (A)",
         )
     )
     return parts
