@@ -165,7 +165,7 @@ def _heat_map(model: str, scene: SceneScore, low: float, high: float, outlined: 
     heads = "".join(f'<th scope="col">{column + 1}</th>' for column in range(columns))
     mean = np.mean([value for value in by_place.values() if math.isfinite(value)] or [math.inf])
     return _scrolling(
-        f'<table class="heat"><caption>{escape(model)}, mean of these {_psnr_text(float(mean))} dB</caption>'
+        f'<table class="heat"><caption>{escape(model)}: {_psnr_text(float(mean))} dB on average</caption>'
         f"<thead><tr><th></th>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>",
         f"PSNR over the grid, {scene.name}, {model}",
     )
@@ -197,7 +197,7 @@ def _scene(report: Report, panels: ScenePanels) -> str:
     if panels.brightened:
         notes.append("brightened for looking (over the brightest tone, power 1 / 1.5); the errors are those of stored values")
     if not panels.near_occlusions:
-        notes.append("no jump of disparity was found, so the crops are those of the largest error")
+        notes.append("no model gave a jump of disparity, so the crops are those of the largest error")
     legends = [f"absolute error {_legend(colormaps.error_colours(), '0', f'{panels.error_scale:.0f} of 255 or more')}"]
     if panels.disparity_scale is not None:
         low, high = panels.disparity_scale

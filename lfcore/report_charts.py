@@ -10,6 +10,7 @@ from lfcore.training.curve import CurvePoint
 
 _COLOURS = 6  # var(--c0) to var(--c5) of the style sheet
 _DASHES = ("", "7 4", "2 3", "9 3 2 3")  # beside the colours, for eyes and printers without them
+_MOST_DOTS = 40  # points of a curve that are marked one by one
 
 
 def curve_chart(curve: Sequence[CurvePoint], name: str) -> str:
@@ -31,12 +32,11 @@ def curve_chart(curve: Sequence[CurvePoint], name: str) -> str:
     parts = []
     for value in range(low, high + 1, max(1, math.ceil((high - low) / 8))):
         parts.append(f'<line class="axis" x1="{left}" x2="{x(last):.1f}" y1="{y(value):.1f}" y2="{y(value):.1f}"/>')
-        parts.append(f'<text class="soft" x="{left - 8}" y="{y(value) + 4:.1f}" text-anchor="end">{value}</text>')
+        parts.append(f'<text class="soft" x="{left - 8}" y="{y(value) + 4:.1f}" text-anchor="end">{value} dB</text>')
     for share in (0, 0.25, 0.5, 0.75, 1):
         step = round(last * share)
         parts.append(f'<text class="soft" x="{x(step):.1f}" y="{height - 24}" text-anchor="middle">{step}</text>')
     parts.append(f'<text class="soft" x="{(left + x(last)) / 2:.1f}" y="{height - 6}" text-anchor="middle">steps</text>')
-    parts.append(f'<text class="soft" x="14" y="{top + 4}">dB</text>')
     ends: list[float] = []
     for index, scene in enumerate(scenes):
         points = [(p.step, p.scores[scene]) for p in curve if math.isfinite(p.scores.get(scene, math.nan))]
@@ -48,6 +48,8 @@ def curve_chart(curve: Sequence[CurvePoint], name: str) -> str:
         parts.append(
             f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
         )
+        if len(points) <= _MOST_DOTS:
+            parts += [f'<circle cx="{x(step):.1f}" cy="{y(value):.1f}" r="3" fill="{colour}"/>' for step, value in points]
         place = y(points[-1][1]) + 4
         while any(abs(place - other) < 15 for other in ends):
             place += 4

@@ -24,7 +24,7 @@ from lfcore.synthesizer import MeanSynthesizer, Synthesis
 from lfcore.training.curve import CurvePoint, read_curve, write_curve
 
 HOSTILE = "<script>alert('x')</script> & \"scene\""
-_VOID = {"meta", "img", "br", "line", "rect", "polyline"}
+_VOID = {"meta", "img", "br", "line", "rect", "polyline", "circle"}
 
 
 @dataclass
