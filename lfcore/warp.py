@@ -55,8 +55,12 @@ def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[i
     For models trained with it, not for the paper's. Arguments as for `backward_warp`. What falls outside
     the picture repeats its edge.
     """
+    return quick_sample(image, *_positions(disparity, offset, origin))
+
+
+def quick_sample(image: Tensor, x: Tensor, y: Tensor) -> Tensor:
+    """Samples of (N, C, H, W) at the positions x and y, px, each (N, h, w), by torch's own bicubic kernel: (N, C, h, w)."""
     _, _, height, width = image.shape
-    x, y = _positions(disparity, offset, origin)
     grid = torch.stack((_grid(x, width), _grid(y, height)), -1)
     return F.grid_sample(image, grid, mode="bicubic", padding_mode="border", align_corners=True)
 
