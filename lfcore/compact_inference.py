@@ -15,7 +15,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from lfcore.compact import CompactModel, log_nearness
+from lfcore.compact import CompactModel, ResidualBlock, log_nearness
 from lfcore.networks import INPUTS
 from lfcore.tone import stored_from_root
 
@@ -42,19 +42,19 @@ class CompactInference:
             features[self._levels :] = _DEVIATION_SCALE / _MEAN_SCALE  # the sweep's input carries the scale of the means
             self._stem = _layer(disparity.stem, dtype, features)
             self._skip = _layer(disparity.skip, dtype, features)
-            self._blocks = [(_layer(block.first, dtype), _layer(block.second, dtype)) for block in disparity.blocks]
+            self._blocks = _block_layers(disparity.blocks, dtype)
             # By phase, then channel: so that a pixel's channels stay together when the phases are put side by side.
             by_phase = torch.arange(4 * config.fine_width).view(-1, 4).T.flatten()
             self._rise = _layer(disparity.rise, dtype, outputs=by_phase)
             self._join = _layer(disparity.join, dtype)
-            self._score = disparity.score.weight.flatten(1).T.contiguous(), disparity.score.bias
-            self._spread = disparity.spread.weight.flatten(1).clone(), disparity.spread.bias
+            self._score = _matrix(disparity.score)
+            self._spread = _matrix(disparity.spread)
             self._sharpness = float(disparity.sharpness) / _MEAN_SCALE
             self._values = config.levels.values()
             x_scale = torch.cat((torch.full((12,), 4.0), torch.full((48,), 10.0), torch.ones(2), torch.full((2,), 0.2)))
             self._colour_stem = _layer(colour.stem, dtype, x_scale)
             self._straight = _layer(colour.straight, dtype, x_scale)
-            self._colour_blocks = [(_layer(block.first, dtype), _layer(block.second, dtype)) for block in colour.blocks]
+            self._colour_blocks = _block_layers(colour.blocks, dtype)
             self._weights, self._residual = _layer(colour.weights, dtype), _layer(colour.residual, dtype)
             self._nearness = float(colour.nearness)
 
@@ -66,7 +66,7 @@ class CompactInference:
         fine = self._join(fine).add_(fine).relu_()
         pixels = fine.permute(0, 2, 3, 1).reshape(h * w, -1).float()  # (h w, C)
         agreement = _box(features[:, self._levels :].to(torch.float32, memory_format=torch.channels_last))
-        scores = torch.addmm(self._score[1], pixels, self._score[0])  # (h w, L)
+        scores = torch.addmm(self._score[1], pixels, self._score[0].T)  # (h w, L)
         scores.sub_(agreement.permute(0, 2, 3, 1).reshape(h * w, -1), alpha=self._sharpness)
         coarse_disparity = (scores.softmax(1) @ self._values).view(1, 1, h, w)
         padded = F.pad(coarse_disparity, (1, 1, 1, 1), mode="replicate")[0, 0]
@@ -118,6 +118,18 @@ def _layer(
     bias = None if bias is None else bias.detach().to(dtype)
     stride, padding, dilation = convolution.stride, convolution.padding, convolution.dilation
     return lambda x: F.conv2d(x, weight, bias, stride, padding, dilation)
+
+
+def _block_layers(blocks: nn.Sequential, dtype: torch.dtype) -> list[tuple[Layer, Layer]]:
+    return [
+        (_layer(block.first, dtype), _layer(block.second, dtype)) for block in blocks if isinstance(block, ResidualBlock)
+    ]
+
+
+def _matrix(convolution: nn.Conv2d) -> tuple[Tensor, Tensor]:
+    """Weights (out, in) and bias of a 1x1 convolution, float32."""
+    assert convolution.bias is not None
+    return convolution.weight.detach().flatten(1).clone(), convolution.bias.detach().clone()
 
 
 def _residuals(x: Tensor, blocks: list[tuple[Layer, Layer]]) -> Tensor:

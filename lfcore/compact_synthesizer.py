@@ -107,7 +107,7 @@ class LateSynthesis(Synthesis):
         return self
 
     @cached_property
-    def warped(self) -> FloatArray:  # type: ignore[override]
+    def warped(self) -> FloatArray:
         """(4, H, W, 3)."""
         return cast(FloatArray, self.__dict__["_compute"]())
 
