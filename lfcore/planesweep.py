@@ -83,8 +83,12 @@ def plane_sweep(
     for first in range(0, levels.count, _BLOCK_LEVELS):
         chosen = slice(first, first + _BLOCK_LEVELS)
         shifts = [(values[chosen] * across, values[chosen] * down) for across, down in offsets.tolist()]
+        taps = {part: _level_taps(values[chosen] * part, luma.device) for part in set(offsets.flatten().tolist())}
         for block, whole in _blocks(window, _valid_for_all(shifts, window, luma.shape[-2:]), shifts[0][0].numel()):
-            shifted = [_shift_all(image, across, down, block) for image, (across, down) in zip(luma, shifts, strict=True)]
+            shifted = [
+                _shift_all(image, taps[across], taps[down], block)
+                for image, (across, down) in zip(luma, offsets.tolist(), strict=True)
+            ]
             counted = None if whole else [_counts(across, down, block, luma) for across, down in shifts]
             mean, deviation = _mean_and_deviation(shifted, counted)
             rows = slice(block.top - window.top, block.bottom - window.top)
@@ -94,29 +98,37 @@ def plane_sweep(
     return out
 
 
-def _shift_all(image: Tensor, across: Tensor, down: Tensor, window: Window) -> Tensor:
-    """One input (B, H, W) at several shifts (L,), px: (B, L, h, w), channels_last. What lies beyond its edge repeats the edge.
+@dataclass(frozen=True)
+class _LevelTaps:
+    """The taps along one axis of several shifts, side by side."""
+
+    first: int  # where the first lies from the output's place
+    weights: Tensor  # (L, K) float32
+
+
+def _shift_all(image: Tensor, across: _LevelTaps, down: _LevelTaps, window: Window) -> Tensor:
+    """One input (B, H, W) at several shifts: (B, L, h, w), channels_last. What lies beyond its edge repeats the edge.
 
     The shifts along y are one matrix product, whose weights hold the four taps of each level at their places, those along x
     one convolution of the same kind. Most of the weights are 0, and still this takes a fraction of the time that one small
     operation per level and tap does.
     """
     h, w = window.shape
-    (first_x, taps_x), (first_y, taps_y) = _level_taps(across), _level_taps(down)
-    rows, columns = h + taps_y.shape[1] - 1, w + taps_x.shape[1] - 1
-    source = _edge_slice(_edge_slice(image, -2, window.top + first_y, rows), -1, window.left + first_x, columns)
-    moved = source.unfold(-2, taps_y.shape[1], 1) @ taps_y.T.to(image.device)  # (B, h, columns, L)
-    return F.conv2d(moved.permute(0, 3, 1, 2), taps_x[:, None, None, :].to(image.device), groups=len(across))
+    levels, taps_y = down.weights.shape
+    rows, columns = h + taps_y - 1, w + across.weights.shape[1] - 1
+    source = _edge_slice(_edge_slice(image, -2, window.top + down.first, rows), -1, window.left + across.first, columns)
+    moved = source.unfold(-2, taps_y, 1) @ down.weights.T  # (B, h, columns, L)
+    return F.conv2d(moved.permute(0, 3, 1, 2), across.weights[:, None, None, :], groups=levels)
 
 
-def _level_taps(shifts: Tensor) -> tuple[int, Tensor]:
-    """The taps of each shift side by side: where the first lies from the output's place, and weights (L, K) float32."""
+def _level_taps(shifts: Tensor, device: torch.device) -> _LevelTaps:
+    """The taps of shifts (L,), px."""
     whole = shifts.floor()
     first, last = int(whole.min()) - 1, int(whole.max()) + 2
     taps = torch.zeros(len(shifts), last - first + 1, dtype=torch.float64)
     places = (whole.long() - 1 - first).unsqueeze(1) + torch.arange(4)
     taps.scatter_(1, places, cubic_taps(shifts - whole))
-    return first, taps.float()
+    return _LevelTaps(first, taps.float().to(device))
 
 
 def _mean_and_deviation(shifted: list[Tensor], counted: list[Tensor] | None) -> tuple[Tensor, Tensor]:
