@@ -244,7 +244,7 @@ def draw_strokes(shape: tuple[int, int], strokes: Sequence[Stroke], rng: np.rand
         across = np.clip((y * dx - x * dy) / (math.sqrt(squared) * np.maximum(half, 0.5)), -1, 1)
         facing = math.sin(light - math.atan2(dy, dx))
         tone = stroke.tone * (1 + depth * facing * across - 0.5 * depth * across**2)
-        _put_over(alpha, shade, (slice(top, bottom), slice(left, right)), cover.astype(np.float32), tone)
+        _put_over(alpha, shade, (slice(top, bottom), slice(left, right)), cover.astype(np.float32), tone.astype(np.float32))
     return Shape(torch.from_numpy(alpha), torch.from_numpy(shade).clamp_min(0.15))
 
 
