@@ -386,9 +386,9 @@ class Controller:
             self._synthesis.cancel_before(self._ticket)
 
     def _wanted(self, light_field: LightField) -> _Wish | None:
-        if self._engine.failed:
-            return None
         here, picture = self.viewpoint, self.picture
+        if self._engine.failed:
+            return _Wish(_Task.QUICK, here) if self._engine.quick and picture is None else None
         if picture is None or not picture.final or (picture.score is None and self.captured_here is not None):
             moving = not self._resting or (self.newest is None and not self._faulted)
             if self._engine.quick and moving and (picture is None or not picture.final):

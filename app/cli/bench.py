@@ -84,5 +84,6 @@ def _frame_times(path: Path, model: str) -> dict[str, Any]:
         "frame_ms_p50": round(times.p50_ms, 2),
         "frame_ms_p95": round(times.p95_ms, 2),
         "frames": times.frames,
+        "views_per_second": round(times.views_per_second, 1),
         "where": times.where,
     }
