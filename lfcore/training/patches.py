@@ -115,13 +115,21 @@ def _draw_scene(scenes: Sequence[TrainingScene], rng: np.random.Generator) -> Tr
 
 
 def _draw_viewpoint(scene: TrainingScene, rng: np.random.Generator) -> tuple[Fraction, Fraction]:
-    # Wide baselines are what the networks are for: a spacing of k views is drawn k^3 times as often as one of 1.
     spacings = np.arange(2, scene.spacing + 1)
-    spacing = int(rng.choice(spacings, p=spacings**3 / np.sum(spacings**3)))
+    spacing = int(rng.choice(spacings, p=_shares(spacings)))
     while True:
         row, column = (int(k) for k in rng.integers(0, spacing + 1, 2))
         if not (row in (0, spacing) and column in (0, spacing)):
             return Fraction(column, spacing), Fraction(row, spacing)
+
+
+def _shares(spacings: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """How often sub-grids of each spacing are drawn: mostly the whole grid, whose corners are what the networks will be given.
+
+    It is not only the baseline: outer views are paler than inner ones, and only from the whole grid can that be learnt.
+    """
+    weights = spacings.astype(np.float64) ** 8
+    return weights / weights.sum()
 
 
 def _spacings(scene: TrainingScene, u: Fraction, v: Fraction) -> list[int]:
@@ -148,7 +156,7 @@ def _draw_views(
     """Five views (5, H, W, 3) of one sub-grid at one place, sheared."""
     field = scene.light_field
     spacings = _spacings(scene, u, v)
-    spacing = spacings[int(rng.choice(len(spacings), p=np.power(spacings, 3) / np.sum(np.power(spacings, 3))))]
+    spacing = spacings[int(rng.choice(len(spacings), p=_shares(np.array(spacings))))]
     row0 = int(rng.integers(field.rows - spacing))
     column0 = int(rng.integers(field.columns - spacing))
     shear = _draw_shear(scene, spacing, levels, config.shear_spread, rng)
