@@ -26,9 +26,8 @@ from lfcore.errors import OutputError
 from lfcore.networks import BORDER, PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
 
-_BUDGET_SECONDS = 1.5  # after it, only what has not been timed at all still is
+_BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
 _ROUNDS = 10  # in turn, and the best of each, so that a busy moment of the machine does not decide
-_PROBE_ROWS = 8
 _WIDTHS = (272, 144, 208, 384, 544)  # what is usual first
 _CHANNELS = (1, 16, 32)
 _KEPT_MACHINES = 32
@@ -56,14 +55,16 @@ def retune() -> Tuning:
 def measured(widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS) -> Tuning:
     """Type and filling first, at one width, then the width. The plain choices come first and stay unless another gains
     clearly: timings are never free of noise, and bfloat16 has to be worth its lost digits."""
-    deadline = time.perf_counter() + _BUDGET_SECONDS
+    began = time.perf_counter()
     exact_kinds = [Tuning(torch.float32, widths[0], multiple) for multiple in channels]
     short_kinds = [replace(kind, dtype=torch.bfloat16) for kind in exact_kinds]
-    seconds = _fastest(exact_kinds + short_kinds, deadline - _BUDGET_SECONDS / 2)
-    kind = _clearly_least([_clearly_least(kinds, seconds, 0.9) for kinds in (exact_kinds, short_kinds)], seconds, 0.8)
+    # By turns, so that where time is short the plain ones of both types are compared.
+    kinds = [kind for pair in zip(exact_kinds, short_kinds, strict=True) for kind in pair]
+    seconds = _fastest(kinds, 2, began + _BUDGET_SECONDS / 2)
+    kind = _clearly_least([_clearly_least(same, seconds, 0.9) for same in (exact_kinds, short_kinds)], seconds, 0.8)
     shapes = [replace(kind, tile_width=width) for width in widths]
-    per_column = {shape: spent / shape.tile_width for shape, spent in _fastest(shapes, deadline).items()}
-    return _clearly_least(shapes, per_column, 0.93)
+    timed = _fastest(shapes, 1, began + _BUDGET_SECONDS)
+    return _clearly_least(shapes, {shape: spent / shape.tile_width for shape, spent in timed.items()}, 0.93)
 
 
 def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: float) -> Tuning:
@@ -72,22 +73,27 @@ def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: 
     return least if cost[least] < factor * cost[choices[0]] else choices[0]
 
 
-def _fastest(choices: list[Tuning], deadline: float) -> dict[Tuning, float]:
-    """Seconds of a strip of the disparity network's hidden layers, by choice."""
+def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> dict[Tuning, float]:
+    """Seconds of a strip of the disparity network's hidden layers, by choice; infinite where there was no time for it. The
+    first `needed` are timed at least once."""
     seconds = dict.fromkeys(choices, math.inf)
+    probes: dict[Tuning, Callable[[], float]] = {}
     with torch.inference_mode():
-        probes = {choice: _probe(choice) for choice in choices}
-        for _ in range(_ROUNDS):
-            for choice, probe in probes.items():
-                if math.isinf(seconds[choice]) or time.perf_counter() < deadline:
-                    seconds[choice] = min(seconds[choice], probe())
+        for turn in range(_ROUNDS):
+            for index, choice in enumerate(choices):
+                if time.perf_counter() > deadline and (turn or index >= needed):
+                    return seconds
+                if choice not in probes:
+                    probes[choice] = _probe(choice)
+                seconds[choice] = min(seconds[choice], probes[choice]())
     return seconds
 
 
 def _probe(tuning: Tuning) -> Callable[[], float]:
     with torch.random.fork_rng(devices=[]):  # its random weights must not shift anybody's sequence
         stack = TunedStack(PaperStack(200, 1), tuning)
-    x = stack.empty_input(_PROBE_ROWS + 2 * BORDER, tuning.tile_width + 2 * BORDER).zero_()
+    rows = max(8, 2 * torch.get_num_threads())  # the threads share out rows
+    x = stack.empty_input(rows + 2 * BORDER, tuning.tile_width + 2 * BORDER).zero_()
 
     def timed() -> float:
         start = time.perf_counter()

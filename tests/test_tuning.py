@@ -1,5 +1,5 @@
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -91,7 +91,23 @@ def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.Mon
     assert choose(0.9, 0.7, 0.6) == Tuning(torch.float32, 144, 16)
 
 
-def test_measuring_takes_a_bounded_time() -> None:
-    """Every choice is timed once even where time is short, so the bound holds for machines of this kind only."""
+def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    timed: list[Tuning] = []
+
+    def probe(choice: Tuning) -> Callable[[], float]:
+        timed.append(choice)
+        return lambda: 0.1 if choice.dtype == torch.bfloat16 else 1.0
+
+    monkeypatch.setattr(tuning, "_probe", probe)
+    monkeypatch.setattr(tuning, "_BUDGET_SECONDS", 0.0)
+    assert tuning.measured() == Tuning(torch.bfloat16, 272, 1)
+    assert timed == [Tuning(torch.float32, 272, 1), Tuning(torch.bfloat16, 272, 1), Tuning(torch.bfloat16, 272, 1)]
+
+
+def test_it_measures_this_machine_and_leaves_random_numbers_alone() -> None:
+    torch.manual_seed(1)
+    expected = torch.rand(3)
+    torch.manual_seed(1)
     chosen = tuning.measured(widths=(144, 208), channels=(1,))
     assert chosen.dtype in (torch.float32, torch.bfloat16) and chosen.tile_width in (144, 208)
+    assert torch.equal(torch.rand(3), expected)
