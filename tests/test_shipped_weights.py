@@ -1,16 +1,19 @@
 """What the shipped weights promise: on the sample, and on a real capture where the test data stand beside the repository."""
 
+import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from assets import sample_path, weights_path
 from lfcore.formats import open_light_field
 from lfcore.lightfield import LightField
-from lfcore.metrics import k16, k16_view
+from lfcore.metrics import k16, k16_view, psnr
 from lfcore.network_synthesizer import NetworkSynthesizer
-from lfcore.synthesizer import MeanSynthesizer, Synthesizer
+from lfcore.networks import BORDER, FullModel
+from lfcore.synthesizer import MeanSynthesizer, Synthesizer, corner_tensor, reference_synthesis
 from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
 
@@ -57,3 +60,29 @@ def test_bfloat16_costs_no_more_than_a_twentieth_of_a_decibel_and_both_beat_the_
 def test_the_score_in_the_file_is_the_score_one_gets(weights: Weights) -> None:
     found = score(NetworkSynthesizer(weights.model, weights.digest, Tuning()), open_light_field(BUTTERCUP))
     assert found == pytest.approx(weights.training["k16_psnr"]["Buttercup"], abs=0.05)
+
+
+@pytest.mark.parametrize("path", SCENES)
+@pytest.mark.parametrize("multiple", [1, 32])
+def test_tiles_in_bfloat16_keep_the_score_of_the_reference_and_leave_no_seams(
+    weights: Weights, path: Path, multiple: int
+) -> None:
+    model = weights.model
+    assert isinstance(model, FullModel)
+    whole = open_light_field(path)
+    top, left = whole.height // 3, whole.width // 3
+    field = dataclasses.replace(whole, views=whole.views[:, :, top : top + 120, left : left + 150])
+    row, column = k16_view(field)
+    u, v = field.position(row, column)
+    reference = reference_synthesis(model, corner_tensor(field), u, v)[0].clamp(0, 1).permute(1, 2, 0).numpy()
+    tuning = Tuning(torch.bfloat16, 64, multiple, 64 * 40)
+    synthesizer = NetworkSynthesizer(model, "tiles", tuning)
+    synthesizer.set_light_field(field)
+    inside = slice(2 * BORDER, -2 * BORDER)
+    found, truth = synthesizer.synthesize(u, v).image[inside, inside], field.view(row, column)[inside, inside]
+    assert abs(psnr(found, truth) - psnr(reference, truth)) <= 0.05
+    difference = np.abs(found - reference).mean(2)
+    seams = {tile.window.left - 2 * BORDER for tile in tuning.tiles(120, 150)} & set(range(1, difference.shape[1]))
+    assert seams
+    beside = sorted({column + side for column in seams for side in (-1, 0)})
+    assert difference[:, beside].mean() < 1.5 * difference.mean()
