@@ -187,7 +187,7 @@ COMMANDS: dict[str, Command] = {
     "open": Command(("Ctrl+O",), "Open a light field by its path", PROGRAM, _show_path_field, False),
     "sample": Command(("Ctrl+L",), "Open the sample light field", PROGRAM, _request(Action.OPEN_SAMPLE), False),
     "close": Command(("Ctrl+W",), "Close the light field", PROGRAM, _request(Action.CLOSE)),
-    "foresight": Command(("A",), "Compute views ahead while nothing else is to be done, or not", PROGRAM, _toggle_foresight, False),
+    "foresight": Command(("A",), "Compute views ahead in idle time, or not", PROGRAM, _toggle_foresight, False),
     "panel": Command(("Tab",), "Show or hide the panel", PROGRAM, _toggle_panel, False),
     "help": Command(("F1", "?"), "Show or hide this page", PROGRAM, _toggle_help, False),
     "escape": Command(("Esc",), "Put away what lies on top: page, field, message, loading", PROGRAM, _escape, False),
