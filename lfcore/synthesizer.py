@@ -115,7 +115,7 @@ class MeanSynthesizer:
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
 
 
-MODEL_NAMES = ("full", "mean", "planesweep")
+MODEL_NAMES = ("full", "realtime", "planesweep", "mean")
 
 
 def make_synthesizer(model: str | Path = "full") -> Synthesizer:

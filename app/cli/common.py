@@ -35,9 +35,9 @@ def add_verb(verbs: Verbs[Any], name: str, summary: str, example: str) -> argpar
 
 def add_light_field(parser: argparse.ArgumentParser) -> None:
     """PATH and --views, for the verbs that open one light field."""
-    parser.add_argument("path", metavar="PATH", type=Path, help="an ESLF picture or a folder of views")
+    parser.add_argument("path", metavar="PATH", type=Path, help="a raw capture, an ESLF picture or a folder of views")
     parser.add_argument(
-        "--views", type=int, default=8, metavar="N", help="side of the middle square of views taken from an ESLF (default: 8)"
+        "--views", type=int, default=8, metavar="N", help="side of the middle square of views taken from a raw capture or an ESLF (default: 8)"
     )
 
 
@@ -47,8 +47,8 @@ def add_model(parser: argparse.ArgumentParser) -> None:
         "--model",
         default="full",
         metavar="NAME",
-        help="full (the paper's two networks, default), planesweep (without networks), mean (average of the corners), "
-        "or a .safetensors file",
+        help="full (the paper's two networks, default), realtime (a small pair of the same design), "
+        "planesweep (without networks), mean (average of the corners), or a .safetensors file",
     )
 
 

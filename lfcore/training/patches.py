@@ -203,6 +203,10 @@ def _draw_shear(
     return int(np.clip(round(wanted / spacing), min(first, 0), max(last, 0)))
 
 
+# Patches brighter than this are taken for encoded with a gamma; linear light is darker.
+_ENCODED_MEAN = 0.25
+
+
 def _draw_tone(views: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
     """The same tone for all five views: exposure, white balance, gamma.
 
@@ -211,8 +215,11 @@ def _draw_tone(views: FloatArray, share: float, rng: np.random.Generator) -> Flo
     """
     if rng.random() >= share:
         return views
-    # More darker than brighter: an ESLF holds linear values, far darker than the pictures that most scenes come as.
-    gamma = float(np.exp(np.clip(rng.normal(0.2, 0.45), -0.8, 1.0)))
+    if float(views[:4, ::5, ::5].mean()) > _ENCODED_MEAN and rng.random() < 0.5:
+        # Back to linear light, as an ESLF holds it: glints that a display's tone has pressed together stand out again.
+        gamma = float(rng.normal(2.1, 0.2))
+    else:
+        gamma = float(np.exp(np.clip(rng.normal(0.1, 0.35), -0.8, 0.8)))
     gains = (rng.uniform(0.7, 1.25) * rng.uniform(0.9, 1.1, 3)).astype(np.float32)
     toned: FloatArray = np.minimum(np.power(views, np.float32(gamma)) * gains, 1)
     return toned
