@@ -27,6 +27,8 @@ from lfcore.networks import BORDER, PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
+_SURE_ROUNDS = 4
+_SMALL_WIDTH = 64
 _ROUNDS = 10  # in turn, and the best of each, so that a busy moment of the machine does not decide
 _WIDTHS = (272, 144, 208, 384, 544)  # what is usual first
 _CHANNELS = (1, 16, 32)
@@ -45,26 +47,32 @@ _measuring = threading.Lock()  # two threads that measure at once would spoil ea
 
 
 def retune() -> Tuning:
-    """Measure anew and remember. Where nothing can be written, the choice lasts as long as the process."""
-    tuning = measured()
-    with contextlib.suppress(OutputError):
-        _remember(tuning)
+    """Measure anew and remember. Where time was too short for a sure choice, as on a busy machine, or nothing can be written,
+    the choice lasts as long as the process."""
+    tuning, sure = measured()
+    if sure:
+        with contextlib.suppress(OutputError):
+            _remember(tuning)
     return tuning
 
 
-def measured(widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS) -> Tuning:
-    """Type and filling first, at one width, then the width. The plain choices come first and stay unless another gains
-    clearly: timings are never free of noise, and bfloat16 has to be worth its lost digits."""
+def measured(widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS) -> tuple[Tuning, bool]:
+    """Type and filling first, at a small width, then the width; and whether there was time to time all choices well.
+
+    The plain choices come first and stay unless another gains clearly: timings are never free of noise, and bfloat16 has to be
+    worth its lost digits.
+    """
     began = time.perf_counter()
-    exact_kinds = [Tuning(torch.float32, widths[0], multiple) for multiple in channels]
+    exact_kinds = [Tuning(torch.float32, _SMALL_WIDTH, multiple) for multiple in channels]
     short_kinds = [replace(kind, dtype=torch.bfloat16) for kind in exact_kinds]
     # By turns, so that where time is short the plain ones of both types are compared.
     kinds = [kind for pair in zip(exact_kinds, short_kinds, strict=True) for kind in pair]
-    seconds = _fastest(kinds, 2, began + _BUDGET_SECONDS / 2)
+    seconds, sure_kind = _fastest(kinds, 2, began + _BUDGET_SECONDS / 2)
     kind = _clearly_least([_clearly_least(same, seconds, 0.9) for same in (exact_kinds, short_kinds)], seconds, 0.8)
     shapes = [replace(kind, tile_width=width) for width in widths]
-    timed = _fastest(shapes, 1, began + _BUDGET_SECONDS)
-    return _clearly_least(shapes, {shape: spent / shape.tile_width for shape, spent in timed.items()}, 0.93)
+    timed, sure_shape = _fastest(shapes, 0, began + _BUDGET_SECONDS)
+    per_column = {shape: spent / shape.tile_width for shape, spent in timed.items()}
+    return _clearly_least(shapes, per_column, 0.93), sure_kind and sure_shape
 
 
 def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: float) -> Tuning:
@@ -73,20 +81,25 @@ def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: 
     return least if cost[least] < factor * cost[choices[0]] else choices[0]
 
 
-def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> dict[Tuning, float]:
-    """Seconds of a strip of the disparity network's hidden layers, by choice; infinite where there was no time for it. The
-    first `needed` are timed at least once."""
+def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> tuple[dict[Tuning, float], bool]:
+    """Seconds of a strip of the disparity network's hidden layers, by choice, infinite where it had too few turns; and whether
+    none had. The first `needed` always have enough."""
     seconds = dict.fromkeys(choices, math.inf)
     probes: dict[Tuning, Callable[[], float]] = {}
+    turns = dict.fromkeys(choices, 0)
     with torch.inference_mode():
         for turn in range(_ROUNDS):
             for index, choice in enumerate(choices):
-                if time.perf_counter() > deadline and (turn or index >= needed):
-                    return seconds
+                if time.perf_counter() > deadline and (index >= needed or turn >= _SURE_ROUNDS):
+                    continue
                 if choice not in probes:
                     probes[choice] = _probe(choice)
                 seconds[choice] = min(seconds[choice], probes[choice]())
-    return seconds
+                turns[choice] += 1
+    for choice in choices:
+        if turns[choice] < _SURE_ROUNDS:
+            seconds[choice] = math.inf
+    return seconds, min(turns.values()) >= _SURE_ROUNDS
 
 
 def _probe(tuning: Tuning) -> Callable[[], float]:

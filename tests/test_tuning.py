@@ -24,9 +24,9 @@ def measurements(monkeypatch: pytest.MonkeyPatch) -> list[Tuning]:
     """What was measured, which is always CHOICE."""
     made: list[Tuning] = []
 
-    def measured() -> Tuning:
+    def measured() -> tuple[Tuning, bool]:
         made.append(CHOICE)
-        return CHOICE
+        return CHOICE, True
 
     monkeypatch.setattr(tuning, "measured", measured)
     return made
@@ -83,7 +83,9 @@ def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.Mon
             return kind * choice.tile_width * (narrow if choice.tile_width == 144 else 1.0)
 
         monkeypatch.setattr(tuning, "_probe", lambda choice: lambda: seconds(choice))
-        return tuning.measured()
+        chosen, sure = tuning.measured()
+        assert sure
+        return chosen
 
     assert choose(0.9, 0.95, 0.97) == Tuning(torch.float32, 272, 1)
     assert choose(0.5, 0.95, 0.97) == Tuning(torch.bfloat16, 272, 1)
@@ -100,14 +102,20 @@ def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytes
 
     monkeypatch.setattr(tuning, "_probe", probe)
     monkeypatch.setattr(tuning, "_BUDGET_SECONDS", 0.0)
-    assert tuning.measured() == Tuning(torch.bfloat16, 272, 1)
-    assert timed == [Tuning(torch.float32, 272, 1), Tuning(torch.bfloat16, 272, 1), Tuning(torch.bfloat16, 272, 1)]
+    assert tuning.measured() == (Tuning(torch.bfloat16, 272, 1), False)
+    assert timed == [Tuning(torch.float32, 64, 1), Tuning(torch.bfloat16, 64, 1)]
+
+
+def test_a_choice_made_in_a_hurry_is_not_remembered(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setattr(tuning, "measured", lambda: (CHOICE, False))
+    assert tuning.machine_tuning() == CHOICE
+    assert tuning.remembered() is None and not folder.exists()
 
 
 def test_it_measures_this_machine_and_leaves_random_numbers_alone() -> None:
     torch.manual_seed(1)
     expected = torch.rand(3)
     torch.manual_seed(1)
-    chosen = tuning.measured(widths=(144, 208), channels=(1,))
+    chosen, _ = tuning.measured(widths=(144, 208), channels=(1,))
     assert chosen.dtype in (torch.float32, torch.bfloat16) and chosen.tile_width in (144, 208)
     assert torch.equal(torch.rand(3), expected)
