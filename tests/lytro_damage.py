@@ -102,6 +102,9 @@ def _change_json(data: bytes, chance: random.Random) -> bytes:
     references = [reference_to(part) for _, part in parts] + ["sha1-" + "0" * 40]
     for _ in range(chance.choice((1, 1, 2, 5))):
         _change(document, chance, references)
+    # Repetitions of repetitions; every value takes three letters at least.
+    if next(islice(_places(document), _MAX_TEXT // 3, None), None) is not None:
+        raise ValueError("too long")
     text = json.dumps(document)
     for name, value in _UNWRITABLE.items():
         text = text.replace(f'"{name}"', value)
