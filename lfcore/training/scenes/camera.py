@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from lfcore.lightfield import FloatArray
+from lfcore.training.scenes.paleness import mixing
 
 Range = tuple[float, float]
 
@@ -25,7 +26,7 @@ class CameraConfig:
     wandering: Range = (0.0, 0.012)  # deviation of each view's (u, v), in baselines
     gain_deviation: Range = (0.0, 0.015)  # of the views' brightness, relative
     tint_deviation: Range = (0.0, 0.008)  # of the views' red, green and blue, relative
-    dark_paleness: Range = (0.4, 1.3)  # how far the corner views of an ESLF's scene lose colour, in units of _PALE
+    dark_paleness: Range = (0.4, 1.3)  # how far the corner views of an ESLF's scene lose colour, see scenes.paleness
     bright_paleness: Range = (0.0, 0.5)  # those of the gamma-encoded ones, as toolboxes decode them
     # How much darker the corner views are. Around 0, as in decoded captures: with 0 to 0.12 the networks learnt to brighten
     # every picture by 4%, which cost half a decibel.
@@ -39,11 +40,6 @@ class CameraConfig:
     dark_mean: Range = (0.07, 0.25)  # mean light of those
     bright_mean: Range = (0.08, 0.38)  # mean light of the gamma-encoded ones, before encoding
 
-
-# Colours of a corner view by those of the middle, rows red, green, blue: light that strays between neighbouring pixels under a
-# microlens mixes the outer views' colours. The mean over the four corners of train/IMG_0288, an ESLF of an Illum; toolboxes'
-# decodings (train/toys) have about a quarter of it.
-_PALE = np.array([[0.910, 0.078, 0.005], [0.023, 0.939, 0.019], [0.037, 0.072, 0.880]], np.float32)
 
 FAULTLESS = CameraConfig(
     misplacement=(0, 0),
@@ -90,12 +86,11 @@ def draw_camera(views: int, config: CameraConfig, rng: np.random.Generator) -> C
     gains = gains * (1 - rng.uniform(*config.vignette) * outward[:, None])
     dark = bool(rng.random() < config.dark_share)
     paleness = rng.uniform(*(config.dark_paleness if dark else config.bright_paleness)) * outward
-    identity = np.eye(3, dtype=np.float32)
     return Camera(
         positions=torch.from_numpy((places + wandering).astype(np.float32)),
         shifts=torch.from_numpy(misplacement.astype(np.float32)),
         gains=gains.astype(np.float32),
-        mixing=(identity + paleness[:, None, None] * (_PALE - identity)).astype(np.float32),
+        mixing=mixing(paleness),
         shading=(rng.uniform(*config.shading) * 2 * places * np.sqrt(outward)[:, None]).astype(np.float32),
         blurs=(rng.uniform(*config.outer_blur) * outward).astype(np.float32),
         softness=float(rng.uniform(*config.softness)),
