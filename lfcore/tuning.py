@@ -28,7 +28,7 @@ from lfcore.tuned_stack import TunedStack, Tuning
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
 _SURE_ROUNDS = 4
-_SMALL_WIDTH = 64
+_SMALL_WIDTH = 144
 _ROUNDS = 10  # in turn, and the best of each, so that a busy moment of the machine does not decide
 _WIDTHS = (272, 144, 208, 384, 544)  # what is usual first
 _CHANNELS = (1, 16, 32)

@@ -103,7 +103,7 @@ def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytes
     monkeypatch.setattr(tuning, "_probe", probe)
     monkeypatch.setattr(tuning, "_BUDGET_SECONDS", 0.0)
     assert tuning.measured() == (Tuning(torch.bfloat16, 272, 1), False)
-    assert timed == [Tuning(torch.float32, 64, 1), Tuning(torch.bfloat16, 64, 1)]
+    assert timed == [Tuning(torch.float32, 144, 1), Tuning(torch.bfloat16, 144, 1)]
 
 
 def test_a_choice_made_in_a_hurry_is_not_remembered(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
