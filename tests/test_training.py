@@ -102,6 +102,27 @@ def test_generated_scenes_are_drawn_as_often_as_asked() -> None:
     assert {scene.weight for scene in mixed([], generated, 0.3)} == {1 / 7}
 
 
+def flat_scene(colour: tuple[int, int, int]) -> TrainingScene:
+    views = np.broadcast_to(np.array(colour, np.uint8), (5, 5, 130, 130, 3)).copy()
+    return TrainingScene(LightField(views, "flat", "", ""), 0, 0)
+
+
+def test_outer_views_of_bright_pictures_made_linear_are_paler_and_those_of_dark_ones_are_as_they_were() -> None:
+    config = PatchConfig(size=32, batch=2, group=2, tone_share=1.0)
+    paler = {}
+    for name, colour in (("bright", (220, 90, 90)), ("dark", (60, 20, 20)), ("grey", (150, 150, 150))):
+        ratios = []
+        for step in range(60):
+            group = sample_group([flat_scene(colour)], config, LEVELS, np.random.default_rng((4, step)))
+            corner, novel = group.inputs[0, :, :, 40, 40], group.target[:, :, 10, 10]  # (B, 3)
+            ratios.append((corner[:, 0] / corner[:, 1]) / (novel[:, 0] / novel[:, 1]))
+        paler[name] = np.concatenate(ratios)
+    assert np.allclose(paler["dark"], 1, atol=1e-5)
+    assert np.allclose(paler["grey"], 1, atol=0.03)
+    assert 0.2 < np.mean(paler["bright"] < 0.99) < 0.6  # half of the patches, less those whose novel view is an outer one too
+    assert paler["bright"].max() < 1 + 1e-5 and paler["bright"].min() > 0.5
+
+
 def test_the_margin_holds_every_sample_of_the_sweep() -> None:
     assert margin(LEVELS) >= 21 + 2
     assert margin(LEVELS) % 2 == 0  # half-resolution models begin at whole pixels of theirs
