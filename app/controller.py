@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from queue import SimpleQueue
 
 from app.engine import Answer, Engine, disparity_range
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
@@ -22,6 +23,7 @@ from lfcore.errors import Cancelled
 from lfcore.lightfield import LightField
 
 Progress = Callable[[float], None]
+Preview = Callable[[Path], LightField | None]
 OpenLightField = Callable[[Path, Progress, Cancel], LightField]
 
 REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
@@ -62,7 +64,14 @@ class _Wish:
 class Controller:
     """Ties the view state to the loader and the synthesis thread. All methods belong to the main thread."""
 
-    def __init__(self, engine: Engine, open_light_field: OpenLightField, wake: Callable[[], None], model: str) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        open_light_field: OpenLightField,
+        wake: Callable[[], None],
+        model: str,
+        preview: Preview = lambda path: None,
+    ) -> None:
         self.state = ViewState()
         self.light_field: LightField | None = None
         self.newest: Answer | None = None  # what is on screen, carried by its disparity map to the viewpoint
@@ -70,6 +79,9 @@ class Controller:
         self.messages: list[str] = []
         self._engine = engine
         self._open_light_field = open_light_field
+        self._preview = preview
+        self._previews: SimpleQueue[tuple[Path, LightField]] = SimpleQueue()
+        self._previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
         self._wake = wake
         self._loader: LatestWorker[LightField] = LatestWorker("loader", wake)
@@ -110,6 +122,11 @@ class Controller:
                     told_at = time.monotonic()
                     self._wake()
 
+            preview = self._preview(path)
+            if preview is not None and not cancelled():
+                preview.content_key  # noqa: B018
+                self._previews.put((path, preview))
+                self._wake()
             light_field = self._open_light_field(path, progress, cancelled)
             light_field.content_key  # noqa: B018  # computed here, where it holds up no frame
             if cancelled():
@@ -124,6 +141,8 @@ class Controller:
         """Give up the light field that is being opened."""
         self._loader.cancel_all()
         self._loading = None
+        if self._previewing:
+            self._take(None)
 
     def close(self) -> None:
         """Put the light field away; the start picture appears."""
@@ -177,7 +196,8 @@ class Controller:
         if self._next is not None and self.share >= 1.0:
             answer, self._next = self._next, None
             self._accept(answer)
-        self._ask(self.light_field)
+        if not self._previewing:
+            self._ask(self.light_field)
 
     @property
     def viewpoint(self) -> Point:
@@ -279,6 +299,7 @@ class Controller:
 
     def _take(self, light_field: LightField | None) -> None:
         self.light_field = light_field
+        self._previewing = False
         self.newest = self.picture = self._next = None
         self._wish = self._shown = None
         self._heading = (0.0, 0.0)
@@ -296,6 +317,12 @@ class Controller:
             self._cached = dict.fromkeys(self._engine.cached_positions(light_field))
 
     def _collect(self) -> None:
+        while not self._previews.empty():
+            path, preview = self._previews.get()
+            if self._loading == path:
+                self._synthesis.cancel_all()
+                self._take(preview)
+                self._previewing = True
         while not self._loader.outcomes.empty():
             loaded = self._loader.outcomes.get()
             if self._loading is None or loaded.ticket != self._load_ticket:
@@ -305,6 +332,8 @@ class Controller:
                 self._synthesis.cancel_all()
                 self._take(loaded.value)
             else:
+                if self._previewing:
+                    self._take(None)
                 self.say(loaded.message)
         while not self._synthesis.outcomes.empty():
             answered = self._synthesis.outcomes.get()

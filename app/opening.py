@@ -29,6 +29,17 @@ def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Ca
     return open_light_field(path, progress=progress, cancelled=cancelled)
 
 
+def preview(path: Path) -> LightField | None:
+    """A coarse picture of what takes seconds to open, in the place of all its views; None for what opens at once, or not."""
+    from lfcore.errors import LfviewError
+    from lfcore.formats import coarse_light_field
+
+    try:
+        return coarse_light_field(path)
+    except (LfviewError, OSError):
+        return None  # opening it will say what is wrong
+
+
 QUICK = "realtime"
 
 

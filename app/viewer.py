@@ -20,7 +20,7 @@ from app.controller import Controller
 from app.engine import Engine
 from app.frametimes import FrameTimes
 from app.interface import Interface
-from app.opening import make_engine, open_by_content
+from app.opening import make_engine, open_by_content, preview
 from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.store import ViewStore, default_root
@@ -85,7 +85,7 @@ def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTime
 def _window(engine: Engine, model: str) -> Iterator[tuple[_Window, Controller]]:
     """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
     window = _Window()
-    controller = Controller(engine, open_by_content, wake=glfw.post_empty_event, model=model)
+    controller = Controller(engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview)
     try:
         window.attach(controller)
         yield window, controller

@@ -25,6 +25,7 @@ Integers = npt.NDArray[np.int64]
 
 STEPS = 6  # places of a centre within a pixel, along x and along y, that have weights of their own
 _MARGIN = 0.5  # px beyond half a pitch at which pixels still count as being under the microlens
+_NEIGHBOURHOOD = 3.5  # px from the outermost view beyond which pixels tell nothing
 
 # How the light under a microlens changes: the sum of changes over these lengths (in pitches), each with its variance (white of
 # a mid-toned scene has 1) and the correlation between colours. Chosen on the model of the camera at several depths of scene.
@@ -99,11 +100,10 @@ def weights(
     `profile` says they got; where `undo_profile` the pixels have not been divided by a white image, and are by the profile.
     Views outside the aperture (beyond the profile's edge) get weights of 0: black.
     """
-    reach = math.ceil(pitch / 2 + _MARGIN)
-    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1)
-    near = np.hypot(x, y) <= pitch / 2 + _MARGIN
-    footprint = np.column_stack([x, y])[near]
     offsets = places.offsets.reshape(-1, 2)
+    radius = min(pitch / 2 + _MARGIN, np.hypot(*offsets.T).max() + _NEIGHBOURHOOD)
+    y, x = np.mgrid[-math.ceil(radius) : math.ceil(radius) + 1, -math.ceil(radius) : math.ceil(radius) + 1].reshape(2, -1)
+    footprint = np.column_stack([x, y])[np.hypot(x, y) <= radius]
     seen = 2 * np.hypot(*offsets.T) / pitch <= profile.edge
     values = np.zeros((4 * STEPS**2, len(offsets), 3, len(footprint)), np.float32)
     for phase in range(len(values)):

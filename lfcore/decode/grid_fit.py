@@ -21,8 +21,8 @@ from lfcore.decode.grid import Float64Array, LensGrid, regular_grid
 PITCH_RANGE = 0.04  # the pitch found may differ from the one told by this share
 ROTATION_RANGE = 0.21  # radians
 _TILE_PITCHES = 6  # side of a tile in pitches
-_SPECTRUM_SIDE = 1024  # px of the sensor's middle whose spectrum is looked at
-_FIRST_ROWS, _TILE_ROWS = 12, 24  # of tiles, spread over the sensor; more tell hardly more
+_SPECTRUM_SIDE = 768  # px of the sensor's middle whose spectrum is looked at
+_FIRST_ROWS, _TILE_ROWS = 8, 20  # of tiles, spread over the sensor; more tell hardly more
 _ROUNDS = 6  # of reweighting
 _PEAK = 3 * math.log(4)  # the three waves together must stand out by this much, in natural logarithms
 # Of a capture only the darkest quarter, by share of the local mean, counts: the rims. In a white image nothing misleads.
@@ -82,8 +82,8 @@ def _from_spectrum(mosaic: npt.NDArray[np.generic], black: float, pitch: float, 
         y, x = divmod(index, 2)
         balanced[y::2, x::2] = plane
     balanced -= balanced.mean()
-    window = np.hanning(height)[:, None] * np.hanning(width)[None]
-    strength = np.abs(np.fft.fft2(balanced * window, s=(2 * height, 2 * width)))
+    window = (np.hanning(height)[:, None] * np.hanning(width)[None]).astype(np.float32)
+    strength = torch.fft.fft2(torch.from_numpy(balanced * window), s=(2 * height, 2 * width)).abs().numpy()
     step = 0.2 * pitch / max(height, width)  # a fifth of the spectrum's resolution
     pitches = pitch * np.arange(1 - PITCH_RANGE, 1 + PITCH_RANGE, step)
     angles = np.arange(-ROTATION_RANGE, ROTATION_RANGE, step)

@@ -57,6 +57,10 @@ class DecodedStore:
             os.utime(path)
         return light_field
 
+    def holds(self, key: str) -> bool:
+        """Whether there is a light field under this key, be it damaged."""
+        return self._path(key).is_file()
+
     def put(self, key: str, light_field: LightField) -> None:
         """Keep this light field, and remove those used longest ago where there would be too many. Raises OutputError."""
         header = _header(light_field)
@@ -155,11 +159,11 @@ def _read(opening: bytes, file: Any, size: int) -> LightField:
     header = file.read(length)
     facts = json.loads(header)
     shape = tuple(int(side) for side in facts["shape"])
-    dtype = {"uint8": np.dtype(np.uint8), "uint16": np.dtype(np.uint16)}[facts["type"]]
+    dtype: np.dtype[Any] = {"uint8": np.dtype(np.uint8), "uint16": np.dtype(np.uint16)}[facts["type"]]
     values = int(np.prod(shape, dtype=np.int64))
     if len(shape) != 5 or len(opening) + length + values * dtype.itemsize + _DIGEST_BYTES != size:
         raise ValueError("of another size")
-    views = np.empty(shape, dtype)
+    views: npt.NDArray[np.generic] = np.empty(shape, dtype)
     file.readinto(views.data)
     if _digest(opening + header, views) != file.read(_DIGEST_BYTES):
         raise ValueError("damaged")

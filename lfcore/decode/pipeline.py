@@ -102,8 +102,7 @@ def open_capture(
     steps = _Steps(progress, cancelled)
     container, capture = _open(Path(path))
     choice = choose_white_image(container, capture)
-    sections = tuple(section.name for section in container.sections)
-    key = key_of(sections, choice, options)
+    key = _key(container, choice, options)
     kept = store.get(key)
     if kept is not None:
         steps.reach(1.0)
@@ -112,6 +111,16 @@ def open_capture(
     with contextlib.suppress(OutputError):  # no room or no permission: it will be decoded again
         store.put(key, light_field)
     return light_field
+
+
+def is_kept(path: str | os.PathLike[str], options: DecodeOptions, store: DecodedStore) -> bool:
+    """Whether `open_capture` would find the capture decoded."""
+    container, capture = _open(Path(path))
+    return store.holds(_key(container, choose_white_image(container, capture), options))
+
+
+def _key(container: Container, choice: Choice, options: DecodeOptions) -> str:
+    return key_of(tuple(section.name for section in container.sections), choice, options)
 
 
 def _decode(container: Container, capture: Capture, choice: Choice, options: DecodeOptions, steps: _Steps) -> LightField:

@@ -26,7 +26,8 @@ _BAND = 256  # rows at a time
 _PROFILE_STEPS = 24  # radii of a profile, up to 1.15 of half a pitch
 _PROFILE_REACH = 1.15
 _PROFILE_SAMPLES = 400_000  # pixels looked at
-_CENTRE = 0.25  # radius, in half pitches, of the middle of a microlens that counts as its centre
+_CENTRE = 0.45  # radius, in half pitches, within which light falls with the square of the radius
+_MIDDLE = 48  # side of the sensor's middle, in pixels of one colour, in which the brightest light is measured
 
 
 def mend_hot_pixels(mosaic: Mosaic, raw: RawImage) -> int:
@@ -82,9 +83,18 @@ def lens_profile(mosaic: Mosaic, raw: RawImage, grid: LensGrid) -> LensProfile:
     total = np.bincount(bins, light[known], _PROFILE_STEPS)
     reference = np.bincount(bins, at_centre[known], _PROFILE_STEPS)
     share = total / np.maximum(reference, 1e-9)
-    share /= max(float(share[steps <= _CENTRE].mean()), 1e-6)
-    share[steps <= _CENTRE] = 1.0  # few pixels lie there, and hardly any light is lost
-    return LensProfile(tuple(steps.round(4).tolist()), tuple(np.minimum.accumulate(share).round(4).tolist()))
+    inner = steps <= _CENTRE
+    counts = np.bincount(bins, minlength=_PROFILE_STEPS)[inner]
+    centre, fading = _at_centre(steps[inner], share[inner], np.sqrt(counts))
+    share = share / centre
+    share[inner] = 1 + fading / centre * steps[inner] ** 2
+    return LensProfile(tuple(steps.round(4).tolist()), tuple(np.minimum.accumulate(np.minimum(share, 1)).round(4).tolist()))
+
+
+def _at_centre(radius: Float64Array, light: Float64Array, weights: Float64Array | None = None) -> tuple[float, float]:
+    """Light right at the centre, and how it changes with the square of the radius, from pixels around the centre."""
+    fading, centre = np.polyfit(radius**2, light, 1, w=weights)
+    return max(float(centre), 1e-6), min(float(fading), 0.0)
 
 
 def _centre_light(
@@ -132,11 +142,11 @@ def relative_light(white: Mosaic, raw: RawImage, grid: LensGrid) -> torch.Tensor
 
 def _brightest(plane: npt.NDArray[np.float32], grid: LensGrid, x: int, y: int) -> float:
     """Light at the centres of microlenses in the sensor's middle, of one colour whose pixels begin at (x, y)."""
-    height, width = plane.shape
-    reach = 8
-    middle = grid.numbered_from(width, height)  # in px of the mosaic, which has twice as many
-    rows, columns = np.meshgrid(np.arange(-reach, reach), np.arange(-reach, reach), indexing="ij")
-    centres = middle.centres(rows, columns).reshape(-1, 2)
-    column = np.rint((centres[:, 0] - x) / 2).astype(int).clip(0, width - 1)
-    row = np.rint((centres[:, 1] - y) / 2).astype(int).clip(0, height - 1)
-    return max(float(plane[row, column].mean()), 1.0)
+    rows, columns = (slice((side - min(side, _MIDDLE)) // 2, (side + min(side, _MIDDLE)) // 2) for side in plane.shape)
+    light = plane[rows, columns].astype(np.float64)
+    py, px = np.mgrid[rows, columns].astype(np.float64) * 2  # a colour has every second pixel
+    px, py = px + x, py + y
+    centres = grid.centres(*grid.nearest(px, py))
+    radius = 2 * np.hypot(px - centres[..., 0], py - centres[..., 1]) / grid.pitch
+    near = radius < _CENTRE
+    return max(_at_centre(radius[near], light[near])[0], 1.0)
