@@ -22,7 +22,7 @@ PITCH_RANGE = 0.04  # the pitch found may differ from the one told by this share
 ROTATION_RANGE = 0.21  # radians
 _TILE_PITCHES = 6  # side of a tile in pitches
 _SPECTRUM_SIDE = 768  # px of the sensor's middle whose spectrum is looked at
-_FIRST_ROWS, _TILE_ROWS = 8, 20  # of tiles, spread over the sensor; more tell hardly more
+_FIRST_ROWS, _TILE_ROWS = 6, 12  # of tiles, spread over the sensor; more tell hardly more
 _ROUNDS = 6  # of reweighting
 _PEAK = 3 * math.log(4)  # the three waves together must stand out by this much, in natural logarithms
 # Of a capture only the darkest quarter, by share of the local mean, counts: the rims. In a white image nothing misleads.
