@@ -115,8 +115,9 @@ class ViewStore:
             try:
                 self._write(path, data)
                 return
-            except OutputError:  # the folder may just have been removed by a program that tidies or clears
-                if path.parent.is_dir() or attempt == _ATTEMPTS - 1:
+            except OutputError as error:
+                # A program that tidies or clears may just have removed the folder, and another have made it again.
+                if not isinstance(error.__cause__, FileNotFoundError) or attempt == _ATTEMPTS - 1:
                     raise
 
     def _write(self, path: Path, data: bytes) -> None:
