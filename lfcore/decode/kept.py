@@ -159,7 +159,8 @@ def _read(opening: bytes, file: Any, size: int) -> LightField:
     header = file.read(length)
     facts = json.loads(header)
     shape = tuple(int(side) for side in facts["shape"])
-    dtype: np.dtype[Any] = {"uint8": np.dtype(np.uint8), "uint16": np.dtype(np.uint16)}[facts["type"]]
+    types: dict[str, np.dtype[Any]] = {"uint8": np.dtype(np.uint8), "uint16": np.dtype(np.uint16)}
+    dtype = types[facts["type"]]
     values = int(np.prod(shape, dtype=np.int64))
     if len(shape) != 5 or len(opening) + length + values * dtype.itemsize + _DIGEST_BYTES != size:
         raise ValueError("of another size")
