@@ -77,6 +77,7 @@ class Canvas:
         # Bound before framebuffers are released: moderngl would otherwise go on binding one that is gone.
         self._resting_place = context.simple_framebuffer((1, 1))
         self._pictures: _Pictures | None = None
+        self._exhibit: moderngl.Texture | None = None  # what is shown in place of a light field
 
     # What there is to draw.
 
@@ -139,6 +140,26 @@ class Canvas:
         self._at_hand.captured.write(np.ascontiguousarray(view))
         self._at_hand.current.clear()
 
+    def set_exhibit(self, pixels: npt.NDArray[np.generic]) -> None:
+        """Take a picture (H, W, 3), uint8, or a map (H, W), float32, that is shown as it is in place of a light field."""
+        height, width = pixels.shape[:2]
+        largest = int(self.context.info["GL_MAX_TEXTURE_SIZE"])
+        if max(height, width) > largest:
+            raise InputError(
+                f"The picture is {width} x {height} px, but this computer's graphics show at most {largest} px a side; "
+                f"write it out with `lfview info FILE --extract DIR` and look at it elsewhere."
+            )
+        self.clear_exhibit()
+        components = pixels.shape[2] if pixels.ndim == 3 else 1
+        self._exhibit = _texture(self.context, (width, height), components, _TEXTURE_TYPES[pixels.dtype.name])
+        self._exhibit.write(np.ascontiguousarray(pixels))
+
+    def clear_exhibit(self) -> None:
+        """Forget that picture or map."""
+        if self._exhibit is not None:
+            self._exhibit.release()
+            self._exhibit = None
+
     @property
     def has_light_field(self) -> bool:
         """Whether there is a picture to draw."""
@@ -178,20 +199,38 @@ class Canvas:
     def draw(self, frame: Frame, target: Target, area: Rect, placement: Placement) -> None:
         """Draw the frame's picture into the target, inside the area (in its pixels, y downwards), at the placement."""
         texture = self._texture_of(frame)
+        values = frame.disparity_range if frame.look is Look.DISPARITY else None
+        self._show(texture, values, frame.dim, target, area, placement)
+
+    def draw_exhibit(self, target: Target, area: Rect, placement: Placement, values: tuple[float, float] | None) -> None:
+        """Draw the exhibit into the target as `draw` does; of a map, `values` are those of the first and the last colour."""
+        assert self._exhibit is not None
+        self._show(self._exhibit, values, 1.0, target, area, placement)
+
+    def _show(
+        self,
+        texture: moderngl.Texture,
+        values: tuple[float, float] | None,
+        dim: float,
+        target: Target,
+        area: Rect,
+        placement: Placement,
+    ) -> None:
+        """A picture, or where `values` are given a map in colours, magnified into the target."""
         framebuffer, (width, height) = target.framebuffer, target.size
-        visible = _visible(self.picture_size(frame.look), area, placement)
+        visible = _visible(texture.size, area, placement)
         framebuffer.viewport = (0, 0, width, height)
         framebuffer.scissor = (visible.x, height - visible.y - visible.height, visible.width, visible.height)
         framebuffer.use()
         sampling = _sampling(placement.scale)
         placed: dict[str, Uniform] = {"origin": placement.origin, "scale": placement.scale, "window_height": float(height)}
-        if frame.look is Look.DISPARITY:
+        if values is not None:
             show = self._pass("show_disparity.frag", sampled=sampling)
             textures = {"disparity": texture, "colours": self._colours}
-            show.render(textures, {**placed, "range": frame.disparity_range})
+            show.render(textures, {**placed, "range": values})
         else:
             show = self._pass("show_image.frag", sampled=sampling)
-            show.render({"picture": texture}, {**placed, "dim": frame.dim})
+            show.render({"picture": texture}, {**placed, "dim": dim})
         framebuffer.scissor = (0, 0, width, height)
 
     def read(self, frame: Frame) -> FloatArray:

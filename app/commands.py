@@ -32,9 +32,18 @@ class OpenPath:
 Request = Action | OpenPath
 
 
+class Needs(Enum):
+    """What must be open for a command to do anything."""
+
+    NOTHING = "nothing"
+    PICTURE = "a light field, or the pictures of a Lytro file without raw"
+    LIGHT_FIELD = "a light field"
+
+
 @dataclass
 class Context:
-    """What a command works on; requests to the program are gathered in `requests`."""
+    """What a command works on; requests to the program are gathered in `requests`. `exhibits`: how many pictures and maps
+    a Lytro file without raw shows, 0 where none is open."""
 
     state: ViewState
     grid: Grid | None
@@ -42,7 +51,15 @@ class Context:
     area: Rect
     loading: bool = False
     messages: bool = False
+    exhibits: int = 0
     requests: list[Request] = field(default_factory=list)
+
+    @property
+    def met(self) -> frozenset[Needs]:
+        """The needs of commands that are met by what is open."""
+        if self.grid is not None:
+            return frozenset(Needs)
+        return frozenset((Needs.NOTHING, Needs.PICTURE) if self.exhibits else (Needs.NOTHING,))
 
 
 @dataclass(frozen=True)
@@ -53,7 +70,7 @@ class Command:
     text: str
     group: str
     run: Callable[[Context], None]
-    needs_light_field: bool = True
+    needs: Needs = Needs.LIGHT_FIELD
 
     @property
     def tooltip(self) -> str:
@@ -75,11 +92,13 @@ def _nudge(du: float, dv: float) -> Callable[[Context], None]:
     return run
 
 
-def _to_captured(step: int) -> Callable[[Context], None]:
+def _step(step: int) -> Callable[[Context], None]:
     def run(context: Context) -> None:
         if context.grid is not None:
             state = context.state
             state.move_to(*context.grid.position(context.grid.stepped(state.u, state.v, step)))
+        elif context.exhibits:
+            context.state.exhibit = (context.state.exhibit + step) % context.exhibits
 
     return run
 
@@ -176,22 +195,22 @@ COMMANDS: dict[str, Command] = {
     "right": Command(("Right",), "Move the viewpoint to the right", MOVING, _nudge(NUDGE, 0)),
     "up": Command(("Up",), "Move the viewpoint up", MOVING, _nudge(0, -NUDGE)),
     "down": Command(("Down",), "Move the viewpoint down", MOVING, _nudge(0, NUDGE)),
-    "previous": Command(("P",), "Go to the previous captured view", MOVING, _to_captured(-1)),
-    "next": Command(("N",), "Go to the next captured view", MOVING, _to_captured(1)),
-    "nearest": Command(("S",), "Snap to the nearest captured view", MOVING, _to_captured(0)),
+    "previous": Command(("P",), "Go to the previous captured view, or picture of a file", MOVING, _step(-1), Needs.PICTURE),
+    "next": Command(("N",), "Go to the next captured view, or picture of a file", MOVING, _step(1), Needs.PICTURE),
+    "nearest": Command(("S",), "Snap to the nearest captured view", MOVING, _step(0)),
     "centre": Command(("Home",), "Go to the centre", MOVING, _centre),
-    "fit": Command(("F",), "Fit the picture into the window", ZOOMING, _fit),
-    "1:1": Command(("Z",), "One screen pixel per picture pixel", ZOOMING, _one_to_one),
-    "zoom in": Command(("+", "="), "Magnify", ZOOMING, _zoom_by(ZOOM_STEP)),
-    "zoom out": Command(("-",), "Make smaller", ZOOMING, _zoom_by(1 / ZOOM_STEP)),
-    "open": Command(("Ctrl+O",), "Open a light field by its path", PROGRAM, _show_path_field, False),
-    "sample": Command(("Ctrl+L",), "Open the sample light field", PROGRAM, _request(Action.OPEN_SAMPLE), False),
-    "close": Command(("Ctrl+W",), "Close the light field", PROGRAM, _request(Action.CLOSE)),
-    "foresight": Command(("A",), "Compute views ahead in idle time, or not", PROGRAM, _toggle_foresight, False),
-    "panel": Command(("Tab",), "Show or hide the panel", PROGRAM, _toggle_panel, False),
-    "help": Command(("F1", "?"), "Show or hide this page", PROGRAM, _toggle_help, False),
-    "escape": Command(("Esc",), "Put away what lies on top: page, field, message, loading", PROGRAM, _escape, False),
-    "quit": Command(("Ctrl+Q",), "End the program", PROGRAM, _request(Action.QUIT), False),
+    "fit": Command(("F",), "Fit the picture into the window", ZOOMING, _fit, Needs.PICTURE),
+    "1:1": Command(("Z",), "One screen pixel per picture pixel", ZOOMING, _one_to_one, Needs.PICTURE),
+    "zoom in": Command(("+", "="), "Magnify", ZOOMING, _zoom_by(ZOOM_STEP), Needs.PICTURE),
+    "zoom out": Command(("-",), "Make smaller", ZOOMING, _zoom_by(1 / ZOOM_STEP), Needs.PICTURE),
+    "open": Command(("Ctrl+O",), "Open a light field by its path", PROGRAM, _show_path_field, Needs.NOTHING),
+    "sample": Command(("Ctrl+L",), "Open the sample light field", PROGRAM, _request(Action.OPEN_SAMPLE), Needs.NOTHING),
+    "close": Command(("Ctrl+W",), "Close what is open", PROGRAM, _request(Action.CLOSE), Needs.PICTURE),
+    "foresight": Command(("A",), "Compute views ahead in idle time, or not", PROGRAM, _toggle_foresight, Needs.NOTHING),
+    "panel": Command(("Tab",), "Show or hide the panel", PROGRAM, _toggle_panel, Needs.NOTHING),
+    "help": Command(("F1", "?"), "Show or hide this page", PROGRAM, _toggle_help, Needs.NOTHING),
+    "escape": Command(("Esc",), "Put away what lies on top: page, field, message, loading", PROGRAM, _escape, Needs.NOTHING),
+    "quit": Command(("Ctrl+Q",), "End the program", PROGRAM, _request(Action.QUIT), Needs.NOTHING),
 }
 
 # What the mouse does, for the F1 page.
@@ -204,7 +223,7 @@ GESTURES: tuple[tuple[str, str, str], ...] = (
 
 
 def run(name: str, context: Context) -> None:
-    """Do the named thing, unless it needs a light field and none is open."""
+    """Do the named thing, unless what it needs is not open."""
     command = COMMANDS[name]
-    if context.grid is not None or not command.needs_light_field:
+    if command.needs in context.met:
         command.run(context)

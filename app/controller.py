@@ -14,7 +14,11 @@ from enum import Enum
 from pathlib import Path
 from queue import SimpleQueue
 
+import numpy as np
+import numpy.typing as npt
+
 from app.engine import Answer, Engine, disparity_range
+from app.exhibits import Exhibit, Exhibition
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.state import CARRIED_NEAR, Grid, Look, Point, Readout, Step, ViewState, carried_share
 from app.worker import Cancel, Done, Job, LatestWorker
@@ -24,7 +28,8 @@ from lfcore.lightfield import LightField
 
 Progress = Callable[[float], None]
 Preview = Callable[[Path], LightField | None]
-OpenLightField = Callable[[Path, Progress, Cancel], LightField]
+Opened = LightField | Exhibition
+Open = Callable[[Path, Progress, Cancel], Opened]
 
 REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
 FADE_SECONDS = 0.1
@@ -67,13 +72,14 @@ class Controller:
     def __init__(
         self,
         engine: Engine,
-        open_light_field: OpenLightField,
+        open_light_field: Open,
         wake: Callable[[], None],
         model: str,
         preview: Preview = lambda path: None,
     ) -> None:
         self.state = ViewState()
         self.light_field: LightField | None = None
+        self.exhibition: Exhibition | None = None  # what is open in place of a light field
         self.newest: Answer | None = None  # what is on screen, carried by its disparity map to the viewpoint
         self.picture: Answer | None = None  # the same, where it was made for exactly the viewpoint on screen
         self.messages: list[str] = []
@@ -84,7 +90,7 @@ class Controller:
         self._previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
         self._wake = wake
-        self._loader: LatestWorker[LightField] = LatestWorker("loader", wake)
+        self._loader: LatestWorker[Opened] = LatestWorker("loader", wake)
         self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
         self._loading: Path | None = None
         self._load_ticket = 0
@@ -110,7 +116,7 @@ class Controller:
     def open(self, path: Path) -> None:
         """Begin to open a light field; one that is still being opened is given up, the one on screen stays until then."""
 
-        def load(cancelled: Cancel) -> LightField:
+        def load(cancelled: Cancel) -> Opened:
             told_at = time.monotonic()
 
             def progress(share: float) -> None:
@@ -127,11 +133,12 @@ class Controller:
                 preview.content_key  # noqa: B018
                 self._previews.put((path, preview))
                 self._wake()
-            light_field = self._open_light_field(path, progress, cancelled)
-            light_field.content_key  # noqa: B018  # computed here, where it holds up no frame
+            opened = self._open_light_field(path, progress, cancelled)
+            if isinstance(opened, LightField):
+                opened.content_key  # noqa: B018  # computed here, where it holds up no frame
             if cancelled():
                 raise Cancelled
-            return light_field
+            return opened
 
         self._loader.cancel_all()
         self._loading, self._loaded_share = path, 0.0
@@ -205,6 +212,17 @@ class Controller:
         return self.state.u, self.state.v
 
     @property
+    def exhibit(self) -> Exhibit | None:
+        """The picture or map on screen of a Lytro file without raw."""
+        return self.exhibition.exhibits[self.state.exhibit] if self.exhibition is not None else None
+
+    @property
+    def name(self) -> str:
+        """Of what is open; empty where nothing is."""
+        opened = self.light_field or self.exhibition
+        return opened.name if opened is not None else ""
+
+    @property
     def share(self) -> float:
         """How far the newest synthesis has been faded in over what was on screen before it."""
         return min(max((self._now - self._fade_from) / self._fade_seconds, 0.0), 1.0)
@@ -249,15 +267,15 @@ class Controller:
 
     def readout(self, instant_ms: float | None) -> Readout:
         """What the panels print. `instant_ms`: how long the picture of the last frame took where it was made per frame."""
-        light_field = self.light_field
+        light_field, exhibition = self.light_field, self.exhibition
         answer = self.picture
         newest = answer or self.newest
         return Readout(
             model=self._model,
             grid=self._grid,
-            name=light_field.name if light_field else "",
-            kind=light_field.kind if light_field else "",
-            source=light_field.source if light_field else "",
+            name=self.name,
+            kind=light_field.kind if light_field else exhibition.sentence if exhibition else "",
+            source=light_field.source if light_field else exhibition.source if exhibition else "",
             warnings=light_field.warnings if light_field else (),
             facts=tuple(light_field.facts.items()) if light_field else (),
             step=self.step,
@@ -273,6 +291,8 @@ class Controller:
             has_disparity=self._newest_disparity,
             disparity_under_cursor=self._disparity_under_cursor(),
             captured_here=self.captured_here,
+            captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
+            value_under_cursor=self._value_under_cursor(),
             cached=tuple(self._cached),
             cache_bytes=self._engine.cache.bytes_used,
             cache_limit=self._engine.cache.limit_bytes,
@@ -297,8 +317,11 @@ class Controller:
     def _newest_disparity(self) -> bool:
         return self.newest is not None and self.newest.synthesis.disparity is not None
 
-    def _take(self, light_field: LightField | None) -> None:
+    def _take(self, opened: Opened | None) -> None:
+        light_field = opened if isinstance(opened, LightField) else None
         self.light_field = light_field
+        self.exhibition = opened if isinstance(opened, Exhibition) else None
+        self.state.exhibit = self.exhibition.first if self.exhibition is not None else 0
         self._previewing = False
         self.newest = self.picture = self._next = None
         self._wish = self._shown = None
@@ -491,13 +514,21 @@ class Controller:
         return ""
 
     def _disparity_under_cursor(self) -> float | None:
-        if self.picture is None or self.picture.synthesis.disparity is None or self.state.cursor is None:
-            return None
-        disparity = self.picture.synthesis.disparity
-        x, y = int(self.state.cursor[0]), int(self.state.cursor[1])
-        if not (0 <= y < disparity.shape[0] and 0 <= x < disparity.shape[1]):
-            return None
-        return float(disparity[y, x])
+        return None if self.picture is None else _at_cursor(self.picture.synthesis.disparity, self.state.cursor)
+
+    def _value_under_cursor(self) -> float | None:
+        exhibit = self.exhibit
+        return None if exhibit is None or exhibit.caption.span is None else _at_cursor(exhibit.pixels, self.state.cursor)
+
+
+def _at_cursor(values: npt.NDArray[np.generic] | None, cursor: Point | None) -> float | None:
+    """The value of a map (H, W) at the cursor, None outside."""
+    if values is None or cursor is None:
+        return None
+    x, y = int(cursor[0]), int(cursor[1])
+    if not (0 <= y < values.shape[0] and 0 <= x < values.shape[1]):
+        return None
+    return float(values[y, x])
 
 
 def _viewpoint_of(answer: Answer) -> Point:

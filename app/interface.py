@@ -14,6 +14,7 @@ from app.canvas import Canvas, Frame, Target
 from app.commands import Action, OpenPath, Request
 from app.controller import Controller
 from app.engine import Answer
+from app.exhibits import Exhibit
 from app.layout import Layout
 from app.state import Look, Placement, Rect, Step, place
 from assets import sample_path
@@ -37,6 +38,7 @@ class Interface:
         self._light_field: LightField | None = None  # what the canvas has taken
         self._answer: Answer | None = None
         self._captured: int | None = None
+        self._exhibit: Exhibit | None = None  # likewise
         self._timer = self._canvas.timer()
         self._timed = False  # a picture was made in the last frame
         self._picture_ms: float | None = None
@@ -64,11 +66,14 @@ class Interface:
             self._fulfil(request)
         self.controller.tick(now)
         self._synchronise()
+        self._synchronise_exhibit()
         pixels = target.size[0] / max(display.x, 1.0)
         grounds = [area for area in (layout.panel, layout.status) if area is not None]
         self._canvas.begin(target, [(_scaled(area, pixels), PANEL) for area in grounds])
         if self._light_field is not None:
             self._draw_picture(target, layout, pixels)
+        elif self._exhibit is not None:
+            self._draw_exhibit(self._exhibit, target, layout, pixels)
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
@@ -80,6 +85,7 @@ class Interface:
     def shutdown(self) -> None:
         """Give imgui's GL objects back; the context must still be current."""
         self._canvas.clear()
+        self._canvas.clear_exhibit()
         imgui.backends.opengl3_shutdown()
 
     def _fulfil(self, request: Request) -> None:
@@ -126,6 +132,27 @@ class Interface:
             canvas.set_captured(light_field.views[divmod(captured, light_field.columns)])
             self._captured = captured
 
+    def _synchronise_exhibit(self) -> None:
+        """The same for what a Lytro file without raw shows."""
+        controller, exhibit = self.controller, self.controller.exhibit
+        if exhibit is self._exhibit:
+            return
+        self._exhibit = None
+        self._canvas.clear_exhibit()
+        if exhibit is not None:
+            try:
+                self._canvas.set_exhibit(exhibit.pixels)
+            except LfviewError as error:
+                controller.close()
+                controller.say(str(error))
+                return
+        self._exhibit = exhibit
+
+    def _draw_exhibit(self, exhibit: Exhibit, target: Target, layout: Layout, pixels: float) -> None:
+        caption, area = exhibit.caption, layout.picture
+        placement = place(self.controller.state.zoom, (caption.width, caption.height), area)
+        self._canvas.draw_exhibit(target, _scaled(area, pixels), _magnified(placement, pixels), caption.span)
+
     def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
         """`pixels`: framebuffer pixels per window unit."""
         if self._timed:  # asked one frame later, when the graphics have done it, so that nothing waits
@@ -135,8 +162,7 @@ class Interface:
             self._timed = self._canvas.prepare(frame)
         area = layout.picture
         placement = place(self.controller.state.zoom, self._canvas.picture_size(frame.look), area)
-        origin = (placement.origin[0] * pixels, placement.origin[1] * pixels)
-        self._canvas.draw(frame, target, _scaled(area, pixels), Placement(placement.scale * pixels, origin))
+        self._canvas.draw(frame, target, _scaled(area, pixels), _magnified(placement, pixels))
 
     def _frame(self) -> Frame:
         """What the picture is to show; dimmed where the chosen look has nothing to show here."""
@@ -162,6 +188,11 @@ class Interface:
 def _scaled(area: Rect, pixels: float) -> Rect:
     """From window units to framebuffer pixels."""
     return Rect(area.x * pixels, area.y * pixels, area.width * pixels, area.height * pixels)
+
+
+def _magnified(placement: Placement, pixels: float) -> Placement:
+    """The same for a placement."""
+    return Placement(placement.scale * pixels, (placement.origin[0] * pixels, placement.origin[1] * pixels))
 
 
 def path_from_text(text: str) -> Path:

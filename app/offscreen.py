@@ -128,7 +128,7 @@ def _wait_for_synthesis(viewer: Offscreen) -> None:
         viewer.frame()
         if controller.messages:
             raise LfviewError(controller.messages[0])
-        if controller.picture is not None and controller.picture.final:
+        if controller.exhibition is not None or (controller.picture is not None and controller.picture.final):
             return
         if time.monotonic() > deadline:
             raise LfviewError(f"The synthesis took more than {PATIENCE_SECONDS:.0f} s; try a smaller light field.")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.engine import Engine
+from app.exhibits import Exhibition, open_exhibition
 from assets import weights_path
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
     from lfcore.synthesizer import Synthesizer
 
 
-def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> LightField:
-    """Open any light field that lfcore can read. Calibration of a Lytro camera is remembered, and an InputError says so."""
+def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> LightField | Exhibition:
+    """Open any light field that lfcore can read, or what a Lytro file without raw shows.
+
+    Calibration of a Lytro camera is remembered, and an InputError says so.
+    """
     from lfcore.decode.calibration_files import holds_calibration
     from lfcore.decode.remembered import remember
     from lfcore.formats import open_light_field
@@ -26,7 +30,8 @@ def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Ca
     if holds_calibration(path):
         remember(path)
         raise InputError(f"{path} is calibration of a Lytro camera: it is remembered, and used for its captures from now on.")
-    return open_light_field(path, progress=progress, cancelled=cancelled)
+    exhibition = open_exhibition(path)
+    return exhibition if exhibition is not None else open_light_field(path, progress=progress, cancelled=cancelled)
 
 
 def preview(path: Path) -> LightField | None:

@@ -65,8 +65,13 @@ def missing(area: Rect, context: Context, readout: Readout) -> None:
 
 
 def legend(area: Rect, state: ViewState, readout: Readout) -> None:
-    """The colour scale of the disparity or the error, with its units."""
+    """The colour scale of the disparity, the error or a file's map, with its units."""
     if area.width < 30 * em() or area.height < 20 * em():
+        return
+    if readout.captions:
+        caption = readout.captions[state.exhibit]
+        if caption.span is not None:
+            _scale(area, _disparity_stops(), [(caption.unit, _ticks(*caption.span))])
         return
     if state.look is Look.DISPARITY and readout.disparity_range is not None and readout.grid is not None:
         low, high = readout.disparity_range
@@ -140,7 +145,7 @@ def loading(area: Rect, context: Context, readout: Readout) -> None:
     """How far the light field being opened has been read."""
     if readout.loading is None:
         return
-    with card("loading", area, (0.5, 1.0) if readout.grid else (0.5, 0.5), 26 * em()):
+    with card("loading", area, (0.5, 1.0) if readout.grid or readout.captions else (0.5, 0.5), 26 * em()):
         wrapped(f"Opening {readout.loading_name}")
         imgui.push_style_var(imgui.StyleVar_.frame_rounding, em() * 0.2)
         imgui.progress_bar(readout.loading, ImVec2(-1, em() * 0.4), "")

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app import keyboard, overlays, picture, sidebar, statusbar, theme
+from app import extras_panel, keyboard, overlays, picture, sidebar, statusbar, theme
 from app.commands import Context, Request
 from app.layout import Layout, lay_out
-from app.state import Grid, Look, Readout, Size, ViewState, place
+from app.state import Look, Readout, Size, ViewState, place
 
 _NO_PICTURE: Size = (1, 1)
 
@@ -23,13 +23,15 @@ def draw(
     window: (width, height) in imgui's units. scale: content scale of text. Returns the layout, in which the caller draws
     the picture, and the requests.
     """
-    layout = lay_out(*window, scale, state.panel and readout.grid is not None)
-    size = picture_size(readout.grid, state.look)
+    layout = lay_out(*window, scale, state.panel and (readout.grid is not None or bool(readout.captions)))
+    size = picture_size(readout, state)
     area = layout.picture
-    context = Context(state, readout.grid, size, area, readout.loading is not None, bool(readout.messages))
+    context = Context(
+        state, readout.grid, size, area, readout.loading is not None, bool(readout.messages), len(readout.captions)
+    )
     keyboard.run_pressed(context)
     state.dragging = state.dragging and imgui.is_mouse_down(0)
-    size = picture_size(readout.grid, state.look)
+    size = picture_size(readout, state)
     covered = state.path_field or state.help
     if readout.grid is not None:
         picture.draw(area, state, size, scale)
@@ -37,10 +39,14 @@ def draw(
         overlays.legend(area, state, readout)
         if not covered:
             overlays.missing(area, context, readout)
+    elif readout.captions:
+        picture.draw_still(area, state, size)
+        overlays.legend(area, state, readout)
     elif readout.loading is None and not covered:
         overlays.start(area, context, fonts)
     if layout.panel is not None:
-        sidebar.draw(layout.panel, context, readout, fonts)
+        panel = extras_panel if readout.captions else sidebar
+        panel.draw(layout.panel, context, readout, fonts)
     statusbar.draw(layout.status, state, readout, place(state.zoom, size, area).scale)
     overlays.loading(area, context, readout)
     overlays.path_field(area, context)
@@ -49,8 +55,12 @@ def draw(
     return layout, context.requests
 
 
-def picture_size(grid: Grid | None, look: Look) -> Size:
-    """(width, height) in pixels of what the look shows of a light field with this grid."""
+def picture_size(readout: Readout, state: ViewState) -> Size:
+    """(width, height) in pixels of what is shown of the open light field or the Lytro file without raw."""
+    if readout.captions:
+        caption = readout.captions[state.exhibit]
+        return caption.width, caption.height
+    grid = readout.grid
     if grid is None:
         return _NO_PICTURE
-    return (2 * grid.width, 2 * grid.height) if look is Look.WARPED_ALL else (grid.width, grid.height)
+    return (2 * grid.width, 2 * grid.height) if state.look is Look.WARPED_ALL else (grid.width, grid.height)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from app.state import Look, Rect, Size, ViewState, pan_by, place, zoom_about
+from app.state import Look, Point, Rect, Size, ViewState, pan_by, place, zoom_about
 from app.widgets import FIXED, window
 
 # Window units (at scale 1) of a drag from corner view to corner view.
@@ -14,6 +14,24 @@ WHEEL_STEP = 1.2
 
 def draw(area: Rect, state: ViewState, picture: Size, scale: float) -> None:
     """The invisible window over the picture that takes the mouse."""
+    delta, hovered = _mouse_in(area)
+    if delta is not None:
+        _drag(state, delta, picture, area, scale)
+    _hover(state, picture, area, hovered)
+    if state.cursor is not None and state.look is Look.WARPED_ALL:
+        state.cursor = (state.cursor[0] % (picture[0] / 2), state.cursor[1] % (picture[1] / 2))
+
+
+def draw_still(area: Rect, state: ViewState, picture: Size) -> None:
+    """The same over a picture without other viewpoints: every drag moves the picture."""
+    delta, hovered = _mouse_in(area)
+    if delta is not None and delta != (0.0, 0.0):
+        state.zoom = pan_by(state.zoom, delta, picture, area)
+    _hover(state, picture, area, hovered)
+
+
+def _mouse_in(area: Rect) -> tuple[Point | None, bool]:
+    """By how much a drag has gone in this frame, None where there is no drag; and whether the mouse is over the area."""
     flags = FIXED | imgui.WindowFlags_.no_scroll_with_mouse.value
     with window("picture", area, flags, padding=ImVec2(0, 0)):
         buttons = (
@@ -28,10 +46,15 @@ def draw(area: Rect, state: ViewState, picture: Size, scale: float) -> None:
         held = imgui.is_item_active() or imgui.is_item_deactivated()
         pressed = imgui.is_item_activated()
     io = imgui.get_io()
+    if not held:
+        return None, hovered
+    return ((0.0, 0.0) if pressed else (io.mouse_delta.x, io.mouse_delta.y)), hovered
+
+
+def _hover(state: ViewState, picture: Size, area: Rect, hovered: bool) -> None:
+    """The wheel zooms; the pixel under the mouse is noted."""
+    io = imgui.get_io()
     mouse = (io.mouse_pos.x, io.mouse_pos.y)
-    if held:
-        delta = (0.0, 0.0) if pressed else (io.mouse_delta.x, io.mouse_delta.y)
-        _drag(state, delta, picture, area, scale)
     if hovered and io.mouse_wheel:
         state.zoom = zoom_about(state.zoom, WHEEL_STEP**io.mouse_wheel, mouse, picture, area)
     state.cursor = _under(mouse, state, picture, area) if hovered else None
@@ -48,10 +71,8 @@ def _drag(state: ViewState, delta: tuple[float, float], picture: Size, area: Rec
 
 
 def _under(mouse: tuple[float, float], state: ViewState, picture: Size, area: Rect) -> tuple[float, float] | None:
-    """The pixel of the light field's views under the mouse, or None beside the picture."""
+    """The pixel of the picture under the mouse, or None beside it."""
     x, y = place(state.zoom, picture, area).to_picture(mouse)
     if not (0 <= x < picture[0] and 0 <= y < picture[1]):
         return None
-    if state.look is Look.WARPED_ALL:
-        return x % (picture[0] / 2), y % (picture[1] / 2)
     return x, y

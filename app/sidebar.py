@@ -59,10 +59,15 @@ def _light_field(context: Context, readout: Readout, fonts: theme.Fonts) -> None
             wrapped(warning, theme.WARNING)
     else:
         text("No light field is open", theme.TEXT_SOFT)
-    half = (width - imgui.get_style().item_spacing.x) / 2
+    open_and_close(context, grid is not None)
+
+
+def open_and_close(context: Context, is_open: bool) -> None:
+    """The two buttons for files."""
+    half = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
     button("Open", "open", context, half)
     imgui.same_line()
-    imgui.begin_disabled(grid is None)
+    imgui.begin_disabled(not is_open)
     button("Close", "close", context, half)
     imgui.end_disabled()
 

@@ -186,6 +186,19 @@ def clamp_viewpoint(u: float, v: float) -> Point:
     return min(max(u, low), high), min(max(v, low), high)
 
 
+@dataclass(frozen=True)
+class Caption:
+    """What is said about a picture or a map of a Lytro file without raw: its name and size (pixels); for a picture of the
+    refocus stack its focus in lambda; for a map the least and the greatest value, and their unit."""
+
+    label: str
+    width: int
+    height: int
+    focus: float | None = None
+    span: tuple[float, float] | None = None
+    unit: str = ""
+
+
 @dataclass
 class ViewState:
     """Everything the person at the screen has chosen."""
@@ -206,6 +219,7 @@ class ViewState:
     path_field: bool = False
     path_text: str = ""
     cursor: Point | None = None  # in picture pixels, None outside
+    exhibit: int = 0  # which picture or map of a Lytro file without raw is shown
 
     def move_to(self, u: float, v: float) -> None:
         """Go to a viewpoint, clamped to the extrapolation limit."""
@@ -268,6 +282,8 @@ class Readout:
     has_disparity: bool = False
     disparity_under_cursor: float | None = None
     captured_here: int | None = None  # number of the captured view at (u, v)
+    captions: tuple[Caption, ...] = ()  # of what a Lytro file without raw shows; `kind` then says what it is
+    value_under_cursor: float | None = None  # in the unit of the caption
     cached: tuple[Point, ...] = ()  # viewpoints in the cache
     cache_bytes: int = 0
     cache_limit: int = 0

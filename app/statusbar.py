@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
+from app.extras_panel import focus_text
 from app.state import STEP_MEANING, Readout, Rect, Step, ViewState
 from app.widgets import em, milliseconds, number, packed, text, tooltip, window
 
@@ -33,10 +34,10 @@ def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float) -> None:
         y = (rect.height - em()) / 2
         imgui.set_cursor_pos(ImVec2(pad, y))
         right = rect.width - pad
-        if readout.grid is None:
+        if readout.grid is None and not readout.captions:
             text(_idle_words(readout), theme.TEXT_SOFT)
             return
-        left = _step(state, readout, pad, y)
+        left = _exhibit(state, readout, pad, y) if readout.captions else _step(state, readout, pad, y)
         gap = em() * 1.6
         for part in reversed(_right_parts(state, readout, zoom)):
             width = imgui.calc_text_size(part.words).x
@@ -74,7 +75,19 @@ def _step(state: ViewState, readout: Readout, x: float, y: float) -> float:
     return start + imgui.calc_text_size(words).x
 
 
+def _exhibit(state: ViewState, readout: Readout, x: float, y: float) -> float:
+    """Which picture or map of a file is on screen; returns where it ends."""
+    caption = readout.captions[state.exhibit]
+    words = f"{caption.label}  {state.exhibit + 1} of {len(readout.captions)}"
+    if caption.focus is not None:
+        words += f"  focus {focus_text(caption.focus)}"
+    _put(_Part(words, "What is on screen of this file", theme.TEXT), x, y)
+    return x + imgui.calc_text_size(words).x
+
+
 def _left_parts(state: ViewState, readout: Readout) -> list[_Part]:
+    if readout.captions:
+        return []
     parts = []
     if readout.busy:
         parts.append(_Part(readout.busy, "What the synthesis thread is doing now"))
@@ -98,8 +111,15 @@ def _right_parts(state: ViewState, readout: Readout, zoom: float) -> list[_Part]
         if readout.disparity_under_cursor is not None and readout.grid is not None:
             per_view = readout.disparity_under_cursor / (readout.grid.columns - 1)
             words += f"  D {number(readout.disparity_under_cursor, 2)} px, {number(per_view, 2)} per view"
-        parts.append(_Part(words, "Pixel under the cursor, and its disparity: over the baseline, and per captured view"))
+        hint = "Pixel under the cursor, and its disparity: over the baseline, and per captured view"
+        if readout.captions:
+            hint = "Pixel under the cursor, and its value in a map"
+            if readout.value_under_cursor is not None:
+                words += f"  {number(readout.value_under_cursor, 2)}"
+        parts.append(_Part(words, hint))
     parts.append(_Part(f"{100 * zoom:.0f} %", "Screen pixels per picture pixel"))
+    if readout.captions:
+        return parts
     parts.append(_Part(f"(u, v)  {number(state.u, 3)}  {number(state.v, 3)}", "The viewpoint; corner views at 0 and 1"))
     return parts
 

@@ -234,8 +234,7 @@ class _Window:
         return content * width / max(glfw.get_framebuffer_size(self._window)[0], 1) or 1.0
 
     def _name_window(self, controller: Controller) -> None:
-        light_field = controller.light_field
-        title = TITLE if light_field is None else f"{light_field.name} \N{EN DASH} {TITLE}"
+        title = f"{controller.name} \N{EN DASH} {TITLE}" if controller.name else TITLE
         if title != self._title:
             self._title = title
             glfw.set_window_title(self._window, title)
