@@ -21,7 +21,7 @@ WEIGHTS ?= $(OUT)/weights
 # Captures as a Lytro Illum's own software stores them are three of twenty; they count three times.
 TRAINING = $(DATA)/train $(foreach name,IMG_0288 bikes_4 bikes_11,$(DATA)/train/$(name) $(DATA)/train/$(name))
 TRAIN = $(PYTHON) -m app train --data $(TRAINING) --val $(DATA)/val --generated 300 --textures $(TEXTURES) \
-	--generated-share 0.4 --tones 0.35 --balance 0.75
+	--generated-share 0.4 --balance 0.75
 
 .PHONY: run test weights lint clean window-packages test-packages
 
@@ -43,9 +43,9 @@ test: $(VENV)/ready-for-tests window-packages test-packages
 # The small pair first, since it teaches the paper's pair. Each goes on where it was stopped.
 weights: $(VENV)/ready
 	mkdir -p $(WEIGHTS)
-	$(TRAIN) --model realtime --out $(WEIGHTS)/realtime.safetensors $(REALTIME)
-	$(TRAIN) --model full --out $(WEIGHTS)/full.safetensors --teacher $(WEIGHTS)/realtime.safetensors $(FULL)
-	$(TRAIN) --model single --out $(WEIGHTS)/single.safetensors $(SINGLE)
+	$(TRAIN) --model realtime --out $(WEIGHTS)/realtime.safetensors --patch 128 --batch 8 --lr 1e-3 --steps 6000 --decay 0.5 --average 0.998 --matching 200 --tones 0.6
+	$(TRAIN) --model full --out $(WEIGHTS)/full.safetensors --teacher $(WEIGHTS)/realtime.safetensors --tones 0.5 --patch 100 --batch 8 --lr 1e-3 --steps 6000 --decay 0.5 --average 0.998 --matching 0
+	$(TRAIN) --model single --out $(WEIGHTS)/single.safetensors --patch 100 --batch 8 --lr 1e-3 --steps 6000 --decay 0.5 --average 0.998
 
 lint: $(VENV)/ready-for-tests
 	$(VENV)/bin/ruff check .

@@ -52,6 +52,8 @@ class Context:
     loading: bool = False
     messages: bool = False
     exhibits: int = 0
+    models: tuple[str, ...] = ()  # to choose from
+    model: str = ""
     requests: list[Request] = field(default_factory=list)
 
     @property
@@ -140,6 +142,12 @@ def _toggle_foresight(context: Context) -> None:
     context.state.foresight = not context.state.foresight
 
 
+def _next_model(context: Context) -> None:
+    if context.models:
+        at = context.models.index(context.model) if context.model in context.models else -1
+        context.state.model = context.models[(at + 1) % len(context.models)]
+
+
 def _toggle_help(context: Context) -> None:
     context.state.help = not context.state.help
 
@@ -206,6 +214,7 @@ COMMANDS: dict[str, Command] = {
     "open": Command(("Ctrl+O",), "Open a light field by its path", PROGRAM, _show_path_field, Needs.NOTHING),
     "sample": Command(("Ctrl+L",), "Open the sample light field", PROGRAM, _request(Action.OPEN_SAMPLE), Needs.NOTHING),
     "close": Command(("Ctrl+W",), "Close what is open", PROGRAM, _request(Action.CLOSE), Needs.PICTURE),
+    "model": Command(("M",), "The next model for a hand at rest", LOOKING, _next_model),
     "foresight": Command(("A",), "Compute views ahead in idle time, or not", PROGRAM, _toggle_foresight, Needs.NOTHING),
     "panel": Command(("Tab",), "Show or hide the panel", PROGRAM, _toggle_panel, Needs.NOTHING),
     "help": Command(("F1", "?"), "Show or hide this page", PROGRAM, _toggle_help, Needs.NOTHING),

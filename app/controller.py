@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from queue import SimpleQueue
@@ -17,7 +17,7 @@ from queue import SimpleQueue
 import numpy as np
 import numpy.typing as npt
 
-from app.engine import Answer, Engine, disparity_range
+from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.state import CARRIED_NEAR, Grid, Look, Point, Readout, Step, ViewState, carried_share
@@ -76,6 +76,7 @@ class Controller:
         wake: Callable[[], None],
         model: str,
         preview: Preview = lambda path: None,
+        models: Mapping[str, ModelChoice] | None = None,
     ) -> None:
         self.state = ViewState()
         self.light_field: LightField | None = None
@@ -89,6 +90,7 @@ class Controller:
         self._previews: SimpleQueue[tuple[Path, LightField]] = SimpleQueue()
         self._previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
+        self._models = models or {}
         self._wake = wake
         self._loader: LatestWorker[Opened] = LatestWorker("loader", wake)
         self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
@@ -190,6 +192,8 @@ class Controller:
         self._now = now
         if self._acted:
             self._acted, self._acted_at = False, now
+        if self.state.model not in ("", self._model):
+            self._change_model(self.state.model)
         self._collect()
         if self.light_field is None:
             return
@@ -272,6 +276,7 @@ class Controller:
         newest = answer or self.newest
         return Readout(
             model=self._model,
+            models=tuple(self._models),
             grid=self._grid,
             name=self.name,
             kind=light_field.kind if light_field else exhibition.sentence if exhibition else "",
@@ -300,6 +305,21 @@ class Controller:
         )
 
     # Inside.
+
+    def _change_model(self, name: str) -> None:
+        """Another model for a hand at rest. What is on screen stays until its first picture is there."""
+        choice = self._models[name]
+        self._model = name
+        self._engine.use(name, choice.make, choice.stands_in)
+        self._synthesis.cancel_all()
+        self._wish = self._next = None
+        self._first_ticket = self._ticket + 1
+        self._faulted = False
+        if self.newest is not None:
+            self.newest = replace(self.newest, final=False)
+        if self.light_field is not None:
+            self._cached = dict.fromkeys(self._engine.cached_positions(self.light_field))
+            self._look_up(self.light_field)
 
     @property
     def _resting(self) -> bool:

@@ -34,6 +34,14 @@ _ROOM_LEFT = 0.1  # of the memory cache, for what the hand itself asks for
 
 
 @dataclass(frozen=True)
+class ModelChoice:
+    """A model that the person may choose. stands_in: whether the quick model serves in its place while the hand moves."""
+
+    make: MakeSynthesizer
+    stands_in: bool
+
+
+@dataclass(frozen=True)
 class Answer:
     """The synthesis of one viewpoint and what the canvas and the panels want to know about it."""
 
@@ -79,8 +87,9 @@ class Engine:
     """Answers queries. What computes or reads belongs to one worker thread; the properties, `cached`, `cached_positions` and
     `stored_position` may be used from any.
 
-    `make_synthesizer`: the model for a hand at rest. `make_quick`: a faster one for a hand that moves; without it the first
-    serves both. `store`: where views of the first are kept on disk.
+    `make_synthesizer`: the model for a hand at rest, which `use` finds again by `name`, and in whose place it puts others.
+    `make_quick`: a faster one for a hand that moves; without it the first serves both. `store`: where views of the first are
+    kept on disk.
     """
 
     def __init__(
@@ -89,9 +98,12 @@ class Engine:
         cache_bytes: int,
         make_quick: MakeSynthesizer | None = None,
         store: ViewStore | None = None,
+        name: str = "",
     ) -> None:
         self.cache = SynthesisCache(cache_bytes)
         self._final = _Model(make_synthesizer)
+        self._models = {name: self._final}  # by name; those that have been used
+        self._stands_in = True  # whether the quick model may serve in place of the other
         self._quick = _Model(make_quick) if make_quick is not None else None
         self._store = store
         self._tidied = False
@@ -99,6 +111,16 @@ class Engine:
         self._stored: frozenset[Point] = frozenset()  # viewpoints on disk, of that light field
         self._unsaved: dict[CacheKey, None] = {}  # in the order in which they came
         self._scores: dict[CacheKey, ScoreText] = {}
+
+    def use(self, name: str, make_synthesizer: MakeSynthesizer, stands_in: bool) -> None:
+        """Take another model for a hand at rest; one that was used under this name before is taken up again.
+
+        stands_in: whether the quick model may serve while the hand moves. Belongs to the main thread; a query that runs is
+        answered by the model it began with.
+        """
+        self._stands_in = stands_in
+        self._final = self._models.setdefault(name, _Model(make_synthesizer))
+        self._stored_of, self._stored = None, frozenset()
 
     @property
     def ready(self) -> bool:
@@ -113,7 +135,7 @@ class Engine:
     @property
     def quick(self) -> bool:
         """Whether there is a model for a hand that moves."""
-        return self._quick is not None and self._quick.failure is None
+        return self._stands_in and self._quick is not None and self._quick.failure is None
 
     def quick_answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
         """The synthesis of (u, v) by the model for a hand that moves. It is not kept: making it again is quick."""
@@ -125,12 +147,13 @@ class Engine:
         known = self.cached(light_field, u, v)
         if known is not None and (known.score is not None or light_field.at(u, v) is None):
             return known
-        synthesizer = self._final.prepare()
+        model = self._final
+        synthesizer = model.prepare()
         key = cache_key(light_field, synthesizer, u, v)
         synthesis = known.synthesis if known is not None else self._from_disk(light_field, key, u, v)
         kept = synthesis is not None
         if synthesis is None:
-            synthesis = self._final.synthesize(light_field, u, v, cancelled)
+            synthesis = model.synthesize(light_field, u, v, cancelled)
             if self._store is not None:
                 self._unsaved[key] = None
         self.cache.put(key, synthesis)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.engine import Engine
+from app.engine import Engine, ModelChoice
 from app.exhibits import Exhibition, open_exhibition
 from assets import weights_path
 from lfcore.errors import InputError
@@ -46,12 +46,26 @@ def preview(path: Path) -> LightField | None:
 
 
 QUICK = "realtime"
+SHIPPED = ("full", "realtime", "planesweep", "mean")  # lfcore.synthesizer.MODEL_NAMES, without importing torch
 
 
 def make_engine(model: str, cache_bytes: int, store: ViewStore | None = None) -> Engine:
     """The engine on the named model or weight file. While the hand moves, the small networks stand in for larger ones."""
-    stands_in = (model == "full" or model.endswith(".safetensors")) and weights_path(QUICK).is_file()
-    return Engine(synthesizer_factory(model), cache_bytes, synthesizer_factory(QUICK) if stands_in else None, store)
+    quick = synthesizer_factory(QUICK) if weights_path(QUICK).is_file() else None
+    engine = Engine(synthesizer_factory(model), cache_bytes, quick, store, Path(model).name)
+    engine.use(Path(model).name, synthesizer_factory(model), is_slow(model))
+    return engine
+
+
+def is_slow(model: str) -> bool:
+    """Whether the small networks should stand in for a model, named or a weight file, while the hand moves."""
+    return model == "full" or model.endswith(".safetensors")
+
+
+def offered_models(model: str) -> dict[str, ModelChoice]:
+    """The models to choose from in the window, by name: the shipped ones, and the one that the program was started with."""
+    names = dict.fromkeys([*SHIPPED, model])
+    return {Path(name).name: ModelChoice(synthesizer_factory(name), is_slow(name)) for name in names}
 
 
 def synthesizer_factory(model: str) -> Callable[[], Synthesizer]:

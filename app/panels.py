@@ -29,6 +29,7 @@ def draw(
     context = Context(
         state, readout.grid, size, area, readout.loading is not None, bool(readout.messages), len(readout.captions)
     )
+    context.models, context.model = readout.models, readout.model
     keyboard.run_pressed(context)
     state.dragging = state.dragging and imgui.is_mouse_down(0)
     size = picture_size(readout, state)

@@ -11,6 +11,7 @@ from app.widgets import (
     DASH,
     FIXED,
     button,
+    choice,
     elided,
     em,
     font,
@@ -43,6 +44,7 @@ def draw(rect: Rect, context: Context, readout: Readout, fonts: theme.Fonts) -> 
             return
         _viewpoint(context, readout, fonts)
         _looks(context, readout, fonts)
+        _model(context, readout)
         _numbers(readout, fonts)
 
 
@@ -138,6 +140,15 @@ def _contrast(context: Context) -> None:
         state.tail = slider("Cut off", state.tail, TAIL_LIMITS, f"{state.tail:.1f} %", hint)
     else:
         imgui.dummy(ImVec2(0, imgui.get_frame_height()))
+
+
+def _model(context: Context, readout: Readout) -> None:
+    """Which model makes the picture for a hand at rest."""
+    if readout.models:
+        hint = "The model that makes the picture when the hand rests.  (M: the next one)"
+        chosen = choice("Model", readout.model, readout.models, hint)
+        if chosen != readout.model:
+            context.state.model = chosen
 
 
 def _numbers(readout: Readout, fonts: theme.Fonts) -> None:

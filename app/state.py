@@ -213,6 +213,7 @@ class ViewState:
     zoom: Zoom = field(default_factory=Zoom)
     gain: float = 8.0  # of the error look
     tail: float = 1.0  # per cent of the disparity values left out at either end of the colour range
+    model: str = ""  # for a hand at rest; empty: the one that the program was started with
     foresight: bool = True  # compute views that may be wanted next while nothing else is to be done
     panel: bool = True
     help: bool = False
@@ -263,6 +264,7 @@ class Readout:
     """What the panels print: facts of the frame on screen, gathered by the controller."""
 
     model: str = ""
+    models: tuple[str, ...] = ()  # to choose from
     grid: Grid | None = None
     name: str = ""
     kind: str = ""

@@ -62,6 +62,8 @@ def _step(state: ViewState, readout: Readout, x: float, y: float) -> float:
     """The step on screen with its dot; returns where it ends."""
     step = readout.step
     words = step.value
+    if step is Step.FULL and readout.model:
+        words = readout.model  # the step of a hand at rest has its model's name
     if readout.step_ms is not None:
         words += f"  {milliseconds(readout.step_ms)}"
     if readout.from_cache:

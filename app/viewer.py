@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,10 +17,10 @@ import glfw  # isort: skip
 from app import frametimes
 from app.canvas import Target, windowed_context
 from app.controller import Controller
-from app.engine import Engine
+from app.engine import Engine, ModelChoice
 from app.frametimes import FrameTimes
 from app.interface import Interface
-from app.opening import make_engine, open_by_content, preview
+from app.opening import make_engine, offered_models, open_by_content, preview
 from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.store import ViewStore, default_root
@@ -55,13 +55,15 @@ def run_viewer(
     """
     store = ViewStore(default_root(), disk_mib * MEBIBYTE) if disk_mib > 0 else None
     engine = make_engine(model, cache_mib * MEBIBYTE, store)
-    show(path if path is not None else sample_path(), engine, Path(model).name, foresight)
+    show(path if path is not None else sample_path(), engine, Path(model).name, foresight, offered_models(model))
     return 0
 
 
-def show(path: Path, engine: Engine, model: str, foresight: bool = True) -> None:
-    """Open the window on the light field at `path` with this engine, and stay until it is closed."""
-    with _window(engine, model) as (window, controller):
+def show(
+    path: Path, engine: Engine, model: str, foresight: bool = True, models: Mapping[str, ModelChoice] | None = None
+) -> None:
+    """Open the window on the light field at `path` with this engine, and stay until it is closed. models: to choose from."""
+    with _window(engine, model, models) as (window, controller):
         controller.state.foresight = foresight
         window.draw()  # the first frame, before anything slow is imported
         controller.open(path)
@@ -82,10 +84,14 @@ def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTime
 
 
 @contextmanager
-def _window(engine: Engine, model: str) -> Iterator[tuple[_Window, Controller]]:
+def _window(
+    engine: Engine, model: str, models: Mapping[str, ModelChoice] | None = None
+) -> Iterator[tuple[_Window, Controller]]:
     """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
     window = _Window()
-    controller = Controller(engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview)
+    controller = Controller(
+        engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview, models=models
+    )
     try:
         window.attach(controller)
         yield window, controller

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from imgui_bundle import ImVec2, ImVec4, imgui
@@ -172,6 +172,18 @@ def switch(label: str, command: str, on: bool, context: commands.Context) -> Non
     key = commands.COMMANDS[command].keys[0]
     imgui.set_cursor_pos_x(right - imgui.calc_text_size(key).x)
     text(key, theme.TEXT_FAINT)
+
+
+def choice(label: str, value: str, choices: Sequence[str], hint: str) -> str:
+    """A list that opens, behind its label. Returns what is chosen."""
+    imgui.align_text_to_frame_padding()
+    text(label, theme.TEXT_SOFT)
+    imgui.same_line(4.5 * em())
+    imgui.set_next_item_width(imgui.get_content_region_avail().x)
+    shown = choices.index(value) if value in choices else 0
+    _, index = imgui.combo(f"##{label}", shown, list(choices))
+    tooltip(hint)
+    return choices[index]
 
 
 def slider(label: str, value: float, limits: tuple[float, float], shown: str, hint: str, flags: int = 0) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -370,3 +371,12 @@ def test_every_state_draws_in_every_size(imgui_context: Any, name: str, size: tu
     picture = screen.layout.picture
     assert picture.width > 0
     assert picture.height > 0
+
+
+def test_m_goes_through_the_models(screen: Screen) -> None:
+    screen.readout = replace(OPEN, models=("full", "realtime", "mean"))
+    screen.press("M")
+    assert screen.state.model == "realtime"
+    screen.readout = replace(screen.readout, model="mean")
+    screen.press("M")
+    assert screen.state.model == "full"

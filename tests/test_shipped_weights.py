@@ -13,11 +13,12 @@ from lfcore.lightfield import LightField
 from lfcore.metrics import k16, k16_view, psnr
 from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel
-from lfcore.synthesizer import MeanSynthesizer, Synthesizer, corner_tensor, reference_synthesis
+from lfcore.synthesizer import MeanSynthesizer, Synthesizer, corner_tensor, make_synthesizer, reference_synthesis
 from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
 
 BUTTERCUP = Path(__file__).parents[2] / "shared" / "data" / "val" / "Buttercup"
+SHIPPED = ("full", "realtime")
 SCENES = [
     sample_path(),
     pytest.param(
@@ -37,9 +38,11 @@ def score(synthesizer: Synthesizer, field: LightField) -> float:
     return k16(synthesizer.synthesize(*field.position(*place)).image, field.view(*place)).psnr
 
 
-def test_they_tell_how_they_were_trained(weights: Weights) -> None:
-    assert weights.model.config.name == "full"
-    assert weights.training["steps"] > 1000
+@pytest.mark.parametrize("name", SHIPPED)
+def test_they_tell_how_they_were_trained(name: str) -> None:
+    weights = load_weights(weights_path(name))
+    assert weights.model.config.name == name
+    assert weights.training["steps"] > 0 and weights.training["config"]["patches"]["batch"] > 0
     assert len(weights.training["scenes"]) >= 10
     # No place on anybody's disk, and no scene of the validation among those trained on.
     assert "/" not in str(weights.training["scenes"])
@@ -56,9 +59,19 @@ def test_bfloat16_costs_no_more_than_a_twentieth_of_a_decibel_and_both_beat_the_
     assert min(exact, short) > score(MeanSynthesizer(), field) + 3
 
 
+@pytest.mark.parametrize("path", SCENES)
+def test_the_small_pair_is_far_above_the_mean_and_not_below_the_papers(path: Path) -> None:
+    field = open_light_field(path)
+    small, mean, full = (score(make_synthesizer(name), field) for name in ("realtime", "mean", "full"))
+    assert small > mean + 3
+    assert small > full - 0.5
+
+
 @pytest.mark.skipif(not BUTTERCUP.is_dir(), reason="the shared test data is not beside the repository")
-def test_the_score_in_the_file_is_the_score_one_gets(weights: Weights) -> None:
-    found = score(NetworkSynthesizer(weights.model, weights.digest, Tuning()), open_light_field(BUTTERCUP))
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_score_in_the_file_is_the_score_one_gets(name: str) -> None:
+    weights = load_weights(weights_path(name))
+    found = score(make_synthesizer(name), open_light_field(BUTTERCUP))
     assert found == pytest.approx(weights.training["k16_psnr"]["Buttercup"], abs=0.05)
 
 
