@@ -89,7 +89,7 @@ def test_full_fades_in_when_new_and_is_there_at_once_from_the_cache(program: Pro
     controller = program.controller
     assert 0 <= controller.share < 1
     assert controller.next_frame_in == 0.0
-    program.tick(FADE_SECONDS)
+    program.tick(FADE_SECONDS + 1e-6)
     assert controller.share == 1
     controller.state.move_to(0.3, 0.4)
     program.until_full()
@@ -509,10 +509,11 @@ def test_foresight_does_not_drive_out_what_is_in_memory() -> None:
     try:
         program.open("3x3")
         program.until_full()
-        for _ in range(50):
+        program.until(lambda: len(program.controller.readout(None).cached) == 5, 0.5)  # of nine
+        for _ in range(50):  # and there it stays
             time.sleep(0.002)
             program.tick(0.5)
-        assert len(program.controller.readout(None).cached) == 5  # of nine
+        assert len(program.controller.readout(None).cached) == 5
         assert (0.5, 0.5) in program.controller.readout(None).cached
     finally:
         program.controller.stop()
