@@ -89,13 +89,18 @@ def noise_table(scenes: list[SceneNoise]) -> str:
         f"{'scene':<{first}}  {'flat':>4}  {'picture':<{second}}  {scales}",
     ]
     for scene in scenes:
-        values = "  ".join(f"{sigma:>6.3f}        " for sigma in scene.captured)
+        values = "  ".join(_cell(sigma, "") for sigma in scene.captured)
         lines.append(f"{scene.name:<{first}}  {scene.flat_share:>4.0%}  {'captured':<{second}}  {values}".rstrip())
         for model in models:
             pairs = zip(scene.synthesized[model], scene.ratio(model), strict=True)
-            values = "  ".join(f"{sigma:>6.3f} ({ratio:.2f}) " for sigma, ratio in pairs)
+            values = "  ".join(_cell(sigma, f"({ratio:.2f})") for sigma, ratio in pairs)
             lines.append(f"{'':<{first}}  {'':>4}  {model:<{second}}  {values}".rstrip())
     return "\n".join(lines)
+
+
+def _cell(sigma: float, ratio: str) -> str:
+    """A deviation and its ratio, 14 characters wide; a dash where there were too few flat pixels."""
+    return f"{'-':>6}{'':8}" if math.isnan(sigma) else f"{sigma:>6.3f} {ratio:<7}"
 
 
 def as_json(scene: SceneNoise, model: str) -> dict[str, object]:

@@ -88,7 +88,7 @@ def test_a_picture_without_flat_regions_has_none() -> None:
 def test_table_and_json_say_what_was_measured() -> None:
     scene = SceneNoise("hill", 0.25, (2.0, 1.0, math.nan), {"full": (1.0, 0.25, math.nan)})
     lines = noise_table([scene]).splitlines()
-    assert lines[2].split() == ["hill", "25%", "captured", "2.000", "1.000", "nan"]
+    assert lines[2].split() == ["hill", "25%", "captured", "2.000", "1.000", "-"]
     assert lines[3].split()[:5] == ["full", "1.000", "(0.50)", "0.250", "(0.25)"]
     assert as_json(scene, "full") == {
         "flat_share": 0.25,
