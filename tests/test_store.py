@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import plane
 from test_cache import key, synthesis
 
 from lfcore import store as module
 from lfcore.cache import CacheKey
+from lfcore.decode.kept import default_store, key_of
 from lfcore.errors import OutputError
 from lfcore.store import UNUSED_DAYS, ViewStore, default_root
 from lfcore.synthesizer import Synthesis
@@ -235,10 +237,23 @@ def test_the_verb_says_how_much_there_is_and_removes_it(
     store = ViewStore(tmp_path)
     store.put(key(0.1), synthesis())
     store.put(key(0.1, content="another"), synthesis())
+    default_store().put(key_of("a capture"), plane(1.0, (2, 2), (40, 50)))
     assert main(["cache", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told == {"folder": str(tmp_path), "views": 2, "light_fields": 2, "bytes": store.usage().bytes, "removed": 0}
+    decoded_bytes = default_store().usage()[1]
+    assert decoded_bytes > 1000
+    assert told == {
+        "folder": str(tmp_path),
+        "views": 2,
+        "light_fields": 2,
+        "bytes": store.usage().bytes,
+        "removed": 0,
+        "decoded_captures": 1,
+        "decoded_bytes": decoded_bytes,
+    }
     assert main(["cache", "--clear"]) == 0
-    assert "2 views removed" in capsys.readouterr().out
+    told_in_words = capsys.readouterr().out
+    assert "2 views removed" in told_in_words and "decoded captures: 1 removed" in told_in_words
     assert main(["cache"]) == 0
-    assert "0 views of 0 light fields" in capsys.readouterr().out
+    told_in_words = capsys.readouterr().out
+    assert "0 views of 0 light fields" in told_in_words and "decoded captures: 0" in told_in_words
