@@ -78,7 +78,7 @@ def _viewpoint(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     heading("Viewpoint", fonts)
     spacing = imgui.get_style().item_spacing
     width = imgui.get_content_region_avail().x
-    pad = round(width * 0.62)
+    pad = round(width * 0.54)
     viewpoint_pad.draw(context.state, readout, pad)
     imgui.same_line()
     imgui.begin_group()
