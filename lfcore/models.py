@@ -29,11 +29,6 @@ def build_model(config: Config) -> Model:
     return _BUILDERS[config.name][1](config)
 
 
-def default_config(name: str) -> Config:
-    """The config that is trained and shipped under a name. Raises KeyError for others than TRAINABLE."""
-    return _BUILDERS[name][0]()
-
-
 def config_from_json(values: Mapping[str, Any]) -> Config:
     """A config as `dataclasses.asdict` and JSON made it. Raises ValueError for what no model here has."""
     name = values.get("name")

@@ -7,8 +7,10 @@ import json
 import os
 import struct
 import sys
+import tempfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -349,14 +351,34 @@ def test_missing_paths_and_things_that_are_no_light_field(tmp_path: Path) -> Non
     assert "neither a file nor a folder" in refusal(tmp_path / "pipe.png")
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read everything")
-def test_files_and_folders_without_permission(tmp_path: Path) -> None:
-    folder = save_views(tmp_path / "views", random_views(2, 2), plain)
-    (folder / "view_01_01.png").chmod(0)
-    assert "Permission denied" in refusal(folder)
-    folder.chmod(0)
-    assert "Permission denied" in refusal(folder)
-    folder.chmod(0o700)
+@contextmanager
+def without_privileges() -> Iterator[None]:
+    """Root may read everything, so it becomes the user with the least rights for a while; others stay who they are."""
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="Windows has no such permissions")
+def test_files_and_folders_without_permission() -> None:
+    with tempfile.TemporaryDirectory() as place:  # tmp_path lies in a folder that others may not enter at all
+        Path(place).chmod(0o755)
+        folder = save_views(Path(place) / "views", random_views(2, 2), plain)
+        folder.chmod(0o755)
+        with without_privileges():
+            assert open_light_field(folder).views.shape[:2] == (2, 2)
+        (folder / "view_01_01.png").chmod(0)
+        with without_privileges():
+            assert "Permission denied" in refusal(folder)
+        folder.chmod(0)
+        with without_privileges():
+            assert "Permission denied" in refusal(folder)
+        folder.chmod(0o700)
 
 
 def test_a_lytro_container_is_recognised_by_its_magic(tmp_path: Path) -> None:
