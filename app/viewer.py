@@ -23,7 +23,8 @@ from app.interface import Interface
 from app.opening import make_engine, offered_models, open_by_content, preview
 from assets import sample_path
 from lfcore.errors import LfviewError
-from lfcore.store import ViewStore, default_root
+from lfcore.kept_files import default_root
+from lfcore.store import ViewStore
 
 TITLE = "lfview"
 WINDOW_SIZE = (1280, 800)

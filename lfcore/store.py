@@ -11,12 +11,9 @@ import contextlib
 import hashlib
 import json
 import os
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +22,7 @@ import numpy as np
 from lfcore.atomic import atomic_path
 from lfcore.cache import CacheKey
 from lfcore.errors import OutputError
+from lfcore.kept_files import KeptFile, code_digest, entries, mark_used, remove
 
 if TYPE_CHECKING:
     from lfcore.synthesizer import Synthesis
@@ -47,28 +45,6 @@ class Usage:
     views: int
     light_fields: int
     bytes: int
-
-
-@dataclass(frozen=True)
-class _File:
-    path: Path
-    size: int
-    used_at: float  # seconds since 1970
-
-
-def default_root() -> Path:
-    """Where views are kept: $LFVIEW_CACHE, or `lfview` in the folder that the system means for caches."""
-    chosen = os.environ.get("LFVIEW_CACHE")
-    if chosen:
-        return Path(chosen).expanduser()
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        given = os.environ.get("XDG_CACHE_HOME", "")
-        base = Path(given) if given.startswith("/") else Path.home() / ".cache"  # relative ones are to be ignored
-    return base / "lfview"
 
 
 class ViewStore:
@@ -98,10 +74,9 @@ class ViewStore:
         except OSError:
             return None
         except (ValueError, KeyError, TypeError):
-            _remove(path)
+            remove(path)
             return None
-        with contextlib.suppress(OSError):
-            os.utime(path)
+        mark_used(path)
         return synthesis
 
     def put(self, key: CacheKey, synthesis: Synthesis) -> None:
@@ -133,10 +108,10 @@ class ViewStore:
         """Remove what has not been used for UNUSED_DAYS, and what programs that were killed have left."""
         now = time.time()
         for folder in self._folders():
-            for entry in _entries(folder):
+            for entry in entries(folder):
                 age = UNUSED_DAYS * _DAY if entry.path.suffix == _SUFFIX and entry.path.name[0] != "." else _LEFTOVER_SECONDS
                 if now - entry.used_at > age:
-                    _remove(entry.path)
+                    remove(entry.path)
             with contextlib.suppress(OSError):
                 folder.rmdir()  # only an empty one goes
 
@@ -150,8 +125,8 @@ class ViewStore:
         """Remove every view. Raises OutputError where some cannot be removed."""
         stuck = 0
         for folder in self._folders():
-            for entry in _entries(folder):
-                stuck += not _remove(entry.path)
+            for entry in entries(folder):
+                stuck += not remove(entry.path)
             with contextlib.suppress(OSError):
                 folder.rmdir()
         if stuck:
@@ -163,33 +138,23 @@ class ViewStore:
         for file in files:
             if excess <= 0:
                 return
-            _remove(file.path)
+            remove(file.path)
             excess -= file.size
 
     def _folders(self) -> Iterator[Path]:
         """The folders of views; others are left alone."""
-        with contextlib.suppress(OSError), os.scandir(self.root) as entries:
-            for entry in entries:
+        with contextlib.suppress(OSError), os.scandir(self.root) as found:
+            for entry in found:
                 if len(entry.name) == 33 and entry.name[16] == "-" and entry.is_dir(follow_symlinks=False):
                     yield Path(entry.path)
 
     def _folder(self, content: str, model: str) -> Path:
-        maker = hashlib.blake2b(f"{model} {_code_digest()}".encode(), digest_size=8).hexdigest()
+        maker = hashlib.blake2b(f"{model} {code_digest('lfcore')}".encode(), digest_size=8).hexdigest()
         seen = hashlib.blake2b(content.encode(), digest_size=8).hexdigest()
         return self.root / f"{seen}-{maker}"
 
     def _path(self, key: CacheKey) -> Path:
         return self._folder(key.content, key.model) / f"{key.u:+.4f}{key.v:+.4f}{_SUFFIX}"
-
-
-@cache
-def _code_digest() -> str:
-    """Digest of lfcore's own sources: views that other code has made are not shown as this program's."""
-    digest = hashlib.blake2b(digest_size=16)
-    for module in sorted(resources.files("lfcore").iterdir(), key=lambda item: item.name):
-        if module.name.endswith(".py"):
-            digest.update(module.name.encode() + module.read_bytes())
-    return digest.hexdigest()
 
 
 def _position(path: Path) -> tuple[float, float] | None:
@@ -201,27 +166,11 @@ def _position(path: Path) -> tuple[float, float] | None:
         return None
 
 
-def _entries(folder: Path) -> Iterator[_File]:
-    """The files of a folder; what vanishes meanwhile is passed over."""
-    with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            with contextlib.suppress(OSError):
-                facts = entry.stat(follow_symlinks=False)
-                yield _File(Path(entry.path), facts.st_size, facts.st_mtime)
-
-
-def _files(folder: Path) -> Iterator[_File]:
+def _files(folder: Path) -> Iterator[KeptFile]:
     """The views of a folder, without files that are still being written."""
-    return (entry for entry in _entries(folder) if entry.path.suffix == _SUFFIX and entry.path.name[0] != ".")
+    return (entry for entry in entries(folder) if entry.path.suffix == _SUFFIX and entry.path.name[0] != ".")
 
 
-def _remove(path: Path) -> bool:
-    """Whether the file is gone, by this or by another program's doing."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return False
-    return True
 
 
 def _largest(size: tuple[int, int]) -> int:

@@ -118,7 +118,7 @@ def _probe(tuning: Tuning) -> Callable[[], float]:
 
 def tuning_file() -> Path:
     """Where choices are kept."""
-    from lfcore.store import default_root
+    from lfcore.kept_files import default_root
 
     return default_root() / "tuning.json"
 

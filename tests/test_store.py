@@ -17,7 +17,8 @@ from lfcore import store as module
 from lfcore.cache import CacheKey
 from lfcore.decode.kept import default_store, key_of
 from lfcore.errors import OutputError
-from lfcore.store import UNUSED_DAYS, ViewStore, default_root
+from lfcore.kept_files import default_root
+from lfcore.store import UNUSED_DAYS, ViewStore
 from lfcore.synthesizer import Synthesis
 
 SIZE = (32, 32)
@@ -63,7 +64,7 @@ def test_other_viewpoints_light_fields_models_and_code_find_nothing(
     for other in (key(0.25, 0.75), key(-0.25, 0.75, content="x"), key(-0.25, 0.75, model="x")):
         assert store.get(other, SIZE) is None
     assert store.positions("x", "m") == store.positions("lf", "x") == []
-    monkeypatch.setattr(module, "_code_digest", lambda: "of other code")
+    monkeypatch.setattr(module, "code_digest", lambda package: "of other code")
     assert store.get(key(-0.25, 0.75), SIZE) is None
 
 

@@ -26,7 +26,8 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print what the stores hold, after clearing them if asked to."""
     from lfcore.decode.kept import default_store
-    from lfcore.store import ViewStore, default_root
+    from lfcore.kept_files import default_root
+    from lfcore.store import ViewStore
 
     store = ViewStore(default_root())
     decoded = default_store()

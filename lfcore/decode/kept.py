@@ -6,15 +6,10 @@ by a rename, removed when it was used longest ago. A file that is not what it sh
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +18,8 @@ import numpy.typing as npt
 
 from lfcore.atomic import atomic_path
 from lfcore.errors import OutputError
+from lfcore.kept_files import KeptFile, code_digest, default_root, entries, mark_used, remove
 from lfcore.lightfield import LightField
-from lfcore.store import default_root
 
 DEFAULT_LIMIT = 2**30
 _FOLDER = "decoded"
@@ -51,10 +46,9 @@ class DecodedStore:
         except OSError:
             return None
         except (ValueError, KeyError, TypeError):
-            _remove(path)
+            remove(path)
             return None
-        with contextlib.suppress(OSError):
-            os.utime(path)
+        mark_used(path)
         return light_field
 
     def holds(self, key: str) -> bool:
@@ -81,54 +75,38 @@ class DecodedStore:
 
     def usage(self) -> tuple[int, int]:
         """(light fields, bytes) that are kept."""
-        files = list(self._files())
-        return len(files), sum(size for _, size, _ in files)
+        files = self._files()
+        return len(files), sum(file.size for file in files)
 
     def clear(self) -> None:
         """Remove all of them."""
-        for path, _, _ in self._files():
-            _remove(path)
+        for file in self._files():
+            remove(file.path)
 
     def _make_room(self, wanted: int) -> None:
-        files = sorted(self._files(), key=lambda file: file[2])
-        excess = sum(size for _, size, _ in files) + wanted - self.limit_bytes
-        for path, size, used_at in files:
-            abandoned = path.name.startswith(".") and time.time() - used_at > _LEFTOVER_SECONDS
+        files = sorted(self._files(), key=lambda file: file.used_at)
+        excess = sum(file.size for file in files) + wanted - self.limit_bytes
+        for file in files:
+            abandoned = file.path.name.startswith(".") and time.time() - file.used_at > _LEFTOVER_SECONDS
             if excess > 0 or abandoned:
-                _remove(path)
-                excess -= size
+                remove(file.path)
+                excess -= file.size
 
-    def _files(self) -> Iterator[tuple[Path, int, float]]:
-        """(path, bytes, time of last use) of each file."""
-        with contextlib.suppress(OSError), os.scandir(self.folder) as entries:
-            for entry in entries:
-                with contextlib.suppress(OSError):
-                    facts = entry.stat(follow_symlinks=False)
-                    if entry.name.endswith(_SUFFIX):
-                        yield Path(entry.path), facts.st_size, facts.st_mtime
+    def _files(self) -> list[KeptFile]:
+        return [file for file in entries(self.folder) if file.path.name.endswith(_SUFFIX)]
 
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}{_SUFFIX}"
 
 
 def default_store() -> DecodedStore:
-    """Where this user's decoded light fields are kept: below lfcore.store.default_root()."""
+    """Where this user's decoded light fields are kept: below lfcore.kept_files.default_root()."""
     return DecodedStore(default_root() / _FOLDER)
 
 
 def key_of(*parts: object) -> str:
     """A key for what was decoded from these parts (anything whose repr says all), by the code as it is."""
-    return hashlib.blake2b(repr((parts, _code_digest())).encode(), digest_size=16).hexdigest()
-
-
-@cache
-def _code_digest() -> str:
-    """Digest of the decoder's sources: what other code has decoded is not shown as this program's."""
-    digest = hashlib.blake2b(digest_size=16)
-    for module in sorted(resources.files("lfcore.decode").iterdir(), key=lambda item: item.name):
-        if module.name.endswith(".py"):
-            digest.update(module.name.encode() + module.read_bytes())
-    return digest.hexdigest()
+    return hashlib.blake2b(repr((parts, code_digest("lfcore.decode"))).encode(), digest_size=16).hexdigest()
 
 
 def _header(light_field: LightField) -> bytes:
@@ -177,8 +155,3 @@ def _read(opening: bytes, file: Any, size: int) -> LightField:
         warnings=tuple(facts["warnings"]),
         dark=frozenset((int(row), int(column)) for row, column in facts["dark"]),
     )
-
-
-def _remove(path: Path) -> None:
-    with contextlib.suppress(OSError):
-        path.unlink()

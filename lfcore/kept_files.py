@@ -1,0 +1,71 @@
+"""What the stores on disk share: where they lie, which files there are, when they were used, by which code they were made."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class KeptFile:
+    """A file of a store."""
+
+    path: Path
+    size: int
+    used_at: float  # seconds since 1970
+
+
+def default_root() -> Path:
+    """Where views are kept: $LFVIEW_CACHE, or `lfview` in the folder that the system means for caches."""
+    chosen = os.environ.get("LFVIEW_CACHE")
+    if chosen:
+        return Path(chosen).expanduser()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        given = os.environ.get("XDG_CACHE_HOME", "")
+        base = Path(given) if given.startswith("/") else Path.home() / ".cache"  # relative ones are to be ignored
+    return base / "lfview"
+
+
+def entries(folder: Path) -> Iterator[KeptFile]:
+    """The files of a folder; what vanishes meanwhile is passed over, and so is a folder that is not there."""
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        for entry in found:
+            with contextlib.suppress(OSError):
+                facts = entry.stat(follow_symlinks=False)
+                yield KeptFile(Path(entry.path), facts.st_size, facts.st_mtime)
+
+
+def mark_used(path: Path) -> None:
+    """Note that a file is used now."""
+    with contextlib.suppress(OSError):
+        os.utime(path)
+
+
+def remove(path: Path) -> bool:
+    """Whether the file is gone, by this or by another program's doing."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True
+
+
+@cache
+def code_digest(package: str) -> str:
+    """Digest of the sources of a package, without those below it: what other code has made is not shown as this program's."""
+    digest = hashlib.blake2b(digest_size=16)
+    for module in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
+        if module.name.endswith(".py"):
+            digest.update(module.name.encode() + module.read_bytes())
+    return digest.hexdigest()
