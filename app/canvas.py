@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from app import glsl
-from app.state import Look, Placement, Point, Rect, Size, carried_share
+from app.geometry import Placement, Point, Rect, Size
+from app.state import Look, carried_share
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray

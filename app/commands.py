@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from app.state import Grid, Look, Rect, Size, ViewState, Zoom, zoom_about
+from app.geometry import Rect, Size, Zoom, zoom_about
+from app.state import Grid, Look, ViewState
 
 NUDGE = 0.02  # of the baseline, by an arrow key
 ZOOM_STEP = 1.25

@@ -20,7 +20,9 @@ import numpy.typing as npt
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
-from app.state import CARRIED_NEAR, Grid, Look, Point, Readout, Step, ViewState, carried_share
+from app.geometry import Point
+from app.readout import Readout
+from app.state import CARRIED_NEAR, Grid, Look, Step, ViewState, carried_share
 from app.worker import Cancel, Done, Job, LatestWorker
 from lfcore.cache import rounded
 from lfcore.errors import Cancelled

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from app.state import Point, ScoreText, Step
+from app.geometry import Point
+from app.readout import ScoreText
+from app.state import Step
 from app.worker import Cancel
 from lfcore.cache import CacheKey, SynthesisCache, cache_key, held_bytes
 from lfcore.errors import LfviewError, OutputError

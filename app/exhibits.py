@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from app.state import Caption
+from app.readout import Caption
 
 if TYPE_CHECKING:
     from lfcore.formats.lytro.extras import Extras

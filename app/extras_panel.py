@@ -6,8 +6,10 @@ from imgui_bundle import imgui
 
 from app import theme
 from app.commands import Context
+from app.geometry import Rect
+from app.readout import Caption, Readout
 from app.sidebar import open_and_close
-from app.state import Caption, Readout, Rect, ViewState
+from app.state import ViewState
 from app.widgets import FIXED, button, elided, font, heading, number, slider, text, tooltip, window, wrapped
 
 

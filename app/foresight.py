@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator
 
 from app.commands import NUDGE
-from app.state import Grid, Point
+from app.geometry import Point
+from app.state import Grid
 
 STEPS_ALONG = 4
 _JUMP = 0.75 * NUDGE  # movements at least this long are steps of their own; shorter ones are parts of a drag

@@ -15,8 +15,9 @@ from app.commands import Action, OpenPath, Request
 from app.controller import Controller
 from app.engine import Answer
 from app.exhibits import Exhibit
+from app.geometry import Placement, Rect, place
 from app.layout import Layout
-from app.state import Look, Placement, Rect, Step, place
+from app.state import Look, Step
 from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.lightfield import CORNERS, LightField

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.state import Rect
+from app.geometry import Rect
 
 PANEL_WIDTH = 296.0
 STATUS_HEIGHT = 30.0

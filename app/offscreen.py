@@ -19,9 +19,9 @@ from app import frametimes
 from app.canvas import Target, standalone_context
 from app.controller import Controller
 from app.frametimes import FrameTimes
+from app.geometry import Size
 from app.interface import Interface
 from app.opening import make_engine, open_by_content
-from app.state import Size
 from lfcore.atomic import atomic_path
 from lfcore.errors import LfviewError, OutputError
 

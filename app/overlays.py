@@ -9,7 +9,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
 from app.commands import COMMANDS, GESTURES, LOOKING, MOVING, PROGRAM, ZOOMING, Action, Context, OpenPath
-from app.state import Look, Readout, Rect, Step, ViewState
+from app.geometry import Rect
+from app.readout import Readout
+from app.state import Look, Step, ViewState
 from app.widgets import CARD, button, card, em, font, number, packed, text, tooltip, wrapped
 from lfcore import colormaps
 from lfcore.lightfield import is_extrapolated

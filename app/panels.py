@@ -9,8 +9,10 @@ from imgui_bundle import imgui
 
 from app import extras_panel, keyboard, overlays, picture, sidebar, statusbar, theme
 from app.commands import Context, Request
+from app.geometry import Size, place
 from app.layout import Layout, lay_out
-from app.state import Look, Readout, Size, ViewState, place
+from app.readout import Readout
+from app.state import Look, ViewState
 
 _NO_PICTURE: Size = (1, 1)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from app.state import Look, Point, Rect, Size, ViewState, pan_by, place, zoom_about
+from app.geometry import Point, Rect, Size, pan_by, place, zoom_about
+from app.state import Look, ViewState
 from app.widgets import FIXED, window
 
 # Window units (at scale 1) of a drag from corner view to corner view.

@@ -6,7 +6,9 @@ from imgui_bundle import ImVec2, imgui
 
 from app import theme, viewpoint_pad
 from app.commands import Context
-from app.state import GAIN_LIMITS, TAIL_LIMITS, Look, Readout, Rect, Step
+from app.geometry import Rect
+from app.readout import Readout
+from app.state import GAIN_LIMITS, TAIL_LIMITS, Look, Step
 from app.widgets import (
     DASH,
     FIXED,

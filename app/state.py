@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
+from app.geometry import Point, Zoom
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
-
-Point = tuple[float, float]
-Size = tuple[int, int]
 
 GAIN_LIMITS = (1.0, 64.0)
 TAIL_LIMITS = (0.0, 20.0)
-ZOOM_LIMITS = (1 / 16, 64.0)
 
 
 class Look(Enum):
@@ -76,79 +73,6 @@ def carried_share(distance: float) -> float:
 
 
 @dataclass(frozen=True)
-class Rect:
-    """A rectangle of the window in its pixels, y downwards."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-    def contains(self, point: Point) -> bool:
-        """Whether the point lies inside."""
-        return self.x <= point[0] < self.x + self.width and self.y <= point[1] < self.y + self.height
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Where a picture lies in the window: `scale` window pixels per picture pixel, `origin` the picture's top left corner."""
-
-    scale: float
-    origin: Point
-
-    def to_picture(self, point: Point) -> Point:
-        """Window point to picture point, in pixels, where pixel (column x, row y) covers [x, x + 1) x [y, y + 1)."""
-        return (point[0] - self.origin[0]) / self.scale, (point[1] - self.origin[1]) / self.scale
-
-    def to_window(self, point: Point) -> Point:
-        """Picture point to window point: the inverse of `to_picture`."""
-        return self.origin[0] + point[0] * self.scale, self.origin[1] + point[1] * self.scale
-
-
-@dataclass(frozen=True)
-class Zoom:
-    """How the picture is magnified: `scale` window pixels per picture pixel (None: fit), `centre` the picture point, as a
-    fraction of its size, in the middle of the area."""
-
-    scale: float | None = None
-    centre: Point = (0.5, 0.5)
-
-
-def place(zoom: Zoom, picture: Size, area: Rect) -> Placement:
-    """The placement of a picture of that size (width, height) in the area under the zoom."""
-    scale = zoom.scale if zoom.scale is not None else fit_scale(picture, area)
-    origin_x = area.x + area.width / 2 - zoom.centre[0] * picture[0] * scale
-    origin_y = area.y + area.height / 2 - zoom.centre[1] * picture[1] * scale
-    return Placement(scale, (round(origin_x), round(origin_y)))
-
-
-def fit_scale(picture: Size, area: Rect) -> float:
-    """The largest scale at which the whole picture lies inside the area."""
-    return max(min(area.width / picture[0], area.height / picture[1]), 1e-3)
-
-
-def zoom_about(zoom: Zoom, factor: float, point: Point, picture: Size, area: Rect) -> Zoom:
-    """Magnify by `factor` while the picture point under the window point `point` stays there."""
-    before = place(zoom, picture, area)
-    scale = min(max(before.scale * factor, ZOOM_LIMITS[0]), ZOOM_LIMITS[1])
-    fixed = before.to_picture(point)
-    centre_x = (fixed[0] + (area.x + area.width / 2 - point[0]) / scale) / picture[0]
-    centre_y = (fixed[1] + (area.y + area.height / 2 - point[1]) / scale) / picture[1]
-    return Zoom(scale, _inside_picture((centre_x, centre_y)))
-
-
-def pan_by(zoom: Zoom, delta: Point, picture: Size, area: Rect) -> Zoom:
-    """Move the picture by `delta` window pixels; its middle part stays in the area."""
-    scale = place(zoom, picture, area).scale
-    centre = (zoom.centre[0] - delta[0] / (scale * picture[0]), zoom.centre[1] - delta[1] / (scale * picture[1]))
-    return Zoom(scale, _inside_picture(centre))
-
-
-def _inside_picture(centre: Point) -> Point:
-    return min(max(centre[0], 0.0), 1.0), min(max(centre[1], 0.0), 1.0)
-
-
-@dataclass(frozen=True)
 class Grid:
     """The captured views of a light field: how many, where, and how large (pixels)."""
 
@@ -184,19 +108,6 @@ def clamp_viewpoint(u: float, v: float) -> Point:
     """The nearest viewpoint at most EXTRAPOLATION_LIMIT beyond the corners."""
     low, high = -EXTRAPOLATION_LIMIT, 1 + EXTRAPOLATION_LIMIT
     return min(max(u, low), high), min(max(v, low), high)
-
-
-@dataclass(frozen=True)
-class Caption:
-    """What is said about a picture or a map of a Lytro file without raw: its name and size (pixels); for a picture of the
-    refocus stack its focus in lambda; for a map the least and the greatest value, and their unit."""
-
-    label: str
-    width: int
-    height: int
-    focus: float | None = None
-    span: tuple[float, float] | None = None
-    unit: str = ""
 
 
 @dataclass
@@ -248,45 +159,3 @@ class ViewState:
             self.gain = min(max(self.gain * factor, GAIN_LIMITS[0]), GAIN_LIMITS[1])
         elif self.look is Look.DISPARITY:
             self.tail = min(max(self.tail + (1.0 if factor > 1 else -1.0), TAIL_LIMITS[0]), TAIL_LIMITS[1])
-
-
-@dataclass(frozen=True)
-class ScoreText:
-    """PSNR (dB) and SSIM of the synthesis on screen against the captured view, and the protocol they follow."""
-
-    psnr: float
-    ssim: float
-    protocol: str
-
-
-@dataclass(frozen=True)
-class Readout:
-    """What the panels print: facts of the frame on screen, gathered by the controller."""
-
-    model: str = ""
-    models: tuple[str, ...] = ()  # to choose from
-    grid: Grid | None = None
-    name: str = ""
-    kind: str = ""
-    source: str = ""
-    warnings: tuple[str, ...] = ()
-    facts: tuple[tuple[str, str], ...] = ()
-    step: Step = Step.BLEND
-    step_ms: float | None = None
-    from_cache: bool = False  # the synthesis on screen was there already
-    busy: str = ""  # what the workers are doing, in words; empty when idle
-    loading: float | None = None  # fraction read of the light field being opened, None when none is
-    loading_name: str = ""
-    messages: tuple[str, ...] = ()
-    score: ScoreText | None = None
-    timings: tuple[tuple[str, float], ...] = ()  # seconds by stage of the newest synthesis
-    disparity_range: tuple[float, float] | None = None  # px over the baseline, at the chosen percentiles
-    has_disparity: bool = False
-    disparity_under_cursor: float | None = None
-    captured_here: int | None = None  # number of the captured view at (u, v)
-    captions: tuple[Caption, ...] = ()  # of what a Lytro file without raw shows; `kind` then says what it is
-    value_under_cursor: float | None = None  # in the unit of the caption
-    cached: tuple[Point, ...] = ()  # viewpoints in the cache
-    cache_bytes: int = 0
-    cache_limit: int = 0
-    cache_hits: int = 0

@@ -5,7 +5,9 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app import theme
-from app.state import Point, Readout, ViewState
+from app.geometry import Point
+from app.readout import Readout
+from app.state import ViewState
 from app.widgets import em, packed, tooltip
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 

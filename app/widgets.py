@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import commands, theme
-from app.state import Rect
+from app.geometry import Rect
 
 _BARE = (
     imgui.WindowFlags_.no_decoration.value

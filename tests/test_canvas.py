@@ -14,7 +14,8 @@ from moving_scene import DISPARITY, SIZE, truth
 from app import glsl
 from app.canvas import BACKGROUND, Canvas, Frame, Target
 from app.engine import _pixels
-from app.state import CARRIED_FAR, CARRIED_NEAR, Look, Rect, Zoom, place
+from app.geometry import Rect, Zoom, place
+from app.state import CARRIED_FAR, CARRIED_NEAR, Look
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray, as_float

@@ -15,9 +15,11 @@ from app import offscreen
 from app.controller import Controller
 from app.engine import Engine
 from app.exhibits import Exhibit, Exhibition, exhibition, open_exhibition
+from app.geometry import Zoom, place
 from app.layout import lay_out
 from app.opening import open_by_content
-from app.state import Caption, Grid, Readout, Zoom, place
+from app.readout import Caption, Readout
+from app.state import Grid
 from app.worker import Cancel
 from lfcore import colormaps
 from lfcore.errors import InputError

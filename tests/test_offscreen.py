@@ -12,9 +12,9 @@ from moving_scene import SIZE, TruthSynthesizer, light_field, truth
 
 from app import offscreen
 from app.engine import Engine
+from app.geometry import Zoom, place
 from app.interface import path_from_text
 from app.layout import lay_out
-from app.state import Zoom, place
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray
 

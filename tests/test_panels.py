@@ -9,10 +9,12 @@ import pytest
 
 from app import panels, theme
 from app.commands import COMMANDS, Action, OpenPath, Request
+from app.geometry import place
 from app.keyboard import _CHARACTERS, _KEYS
 from app.layout import Layout, lay_out
 from app.picture import DRAG_SPAN
-from app.state import Grid, Look, Readout, ScoreText, Step, ViewState, place
+from app.readout import Readout, ScoreText
+from app.state import Grid, Look, Step, ViewState
 
 GRID = Grid(rows=8, columns=8, width=541, height=376)
 OPEN = Readout(model="full", grid=GRID, name="Meadow", kind="folder of views", source="/tmp/Meadow", cache_limit=2**20)

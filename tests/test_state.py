@@ -7,20 +7,9 @@ import random
 import pytest
 
 from app.controller import MAGNET_RADIUS
+from app.geometry import ZOOM_LIMITS, Rect, Zoom, fit_scale, pan_by, place, zoom_about
 from app.layout import lay_out
-from app.state import (
-    GAIN_LIMITS,
-    ZOOM_LIMITS,
-    Grid,
-    Look,
-    Rect,
-    ViewState,
-    Zoom,
-    fit_scale,
-    pan_by,
-    place,
-    zoom_about,
-)
+from app.state import GAIN_LIMITS, Grid, Look, ViewState
 from lfcore.lightfield import CORNERS
 
 AREA = Rect(0, 0, 984, 770)

@@ -14,9 +14,9 @@ import pytest
 from moving_scene import DISPARITY, light_field, truth
 from virtual_screen import SIZE, VirtualScreen, missing_tools, virtual_screen, wait_until
 
+from app.geometry import Zoom, place
 from app.layout import lay_out
 from app.picture import DRAG_SPAN
-from app.state import Zoom, place
 from lfcore import colormaps
 from lfcore.lightfield import FloatArray, LightField
 

@@ -1,0 +1,63 @@
+"""What the panels print, as plain values: gathered by the controller once a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.geometry import Point
+from app.state import Grid, Step
+
+
+@dataclass(frozen=True)
+class Caption:
+    """What is said about a picture or a map of a Lytro file without raw: its name and size (pixels); for a picture of the
+    refocus stack its focus in lambda; for a map the least and the greatest value, and their unit."""
+
+    label: str
+    width: int
+    height: int
+    focus: float | None = None
+    span: tuple[float, float] | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ScoreText:
+    """PSNR (dB) and SSIM of the synthesis on screen against the captured view, and the protocol they follow."""
+
+    psnr: float
+    ssim: float
+    protocol: str
+
+
+@dataclass(frozen=True)
+class Readout:
+    """What the panels print: facts of the frame on screen, gathered by the controller."""
+
+    model: str = ""
+    models: tuple[str, ...] = ()  # to choose from
+    grid: Grid | None = None
+    name: str = ""
+    kind: str = ""
+    source: str = ""
+    warnings: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    step: Step = Step.BLEND
+    step_ms: float | None = None
+    from_cache: bool = False  # the synthesis on screen was there already
+    busy: str = ""  # what the workers are doing, in words; empty when idle
+    loading: float | None = None  # fraction read of the light field being opened, None when none is
+    loading_name: str = ""
+    messages: tuple[str, ...] = ()
+    score: ScoreText | None = None
+    timings: tuple[tuple[str, float], ...] = ()  # seconds by stage of the newest synthesis
+    disparity_range: tuple[float, float] | None = None  # px over the baseline, at the chosen percentiles
+    has_disparity: bool = False
+    disparity_under_cursor: float | None = None
+    captured_here: int | None = None  # number of the captured view at (u, v)
+    captions: tuple[Caption, ...] = ()  # of what a Lytro file without raw shows; `kind` then says what it is
+    value_under_cursor: float | None = None  # in the unit of the caption
+    cached: tuple[Point, ...] = ()  # viewpoints in the cache
+    cache_bytes: int = 0
+    cache_limit: int = 0
+    cache_hits: int = 0
