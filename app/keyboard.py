@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from imgui_bundle import imgui
 
 from app import commands
@@ -16,10 +18,16 @@ _KEYS: dict[str, tuple[imgui.Key, ...]] = {
     "Home": (imgui.Key.home,),
     "Tab": (imgui.Key.tab,),
     "Esc": (imgui.Key.escape,),
-    "F1": (imgui.Key.f1,),
+    "End": (imgui.Key.end,),
+    "Enter": (imgui.Key.enter, imgui.Key.keypad_enter),
+    "Backspace": (imgui.Key.backspace,),
+    "Comma": (imgui.Key.comma,),
+    "PgUp": (imgui.Key.page_up,),
+    "PgDn": (imgui.Key.page_down,),
+    **{f"F{number}": (getattr(imgui.Key, f"f{number}"),) for number in range(1, 13)},
 }
 # Typed with different keys on different keyboards, so they are taken as characters.
-_CHARACTERS = frozenset("?+=-,.")
+_CHARACTERS = frozenset("?+=-,./[]")
 _WHILE_TYPING = frozenset(("Esc", "F1"))
 _REPEATING = frozenset(("Left", "Right", "Up", "Down"))
 
@@ -29,21 +37,33 @@ def run_pressed(context: commands.Context) -> None:
     io = imgui.get_io()
     typing = io.want_text_input or context.state.path_field
     typed = "" if typing else "".join(map(chr, io.input_queue_characters))
-    ctrl = io.key_ctrl or _ctrl_just_released()
+    held = _Held(_or_just_released(io.key_ctrl, _CTRL), _or_just_released(io.key_shift, _SHIFT))
     for name, command in commands.COMMANDS.items():
-        if any(_pressed(key, typed, typing, ctrl) for key in command.keys) and not io.key_alt:
+        if any(_pressed(key, typed, typing, held) for key in command.keys) and not io.key_alt:
             commands.run(name, context)
 
 
-def _pressed(name: str, typed: str, typing: bool, ctrl: bool) -> bool:
+@dataclass(frozen=True)
+class _Held:
+    """The keys that are held together with others."""
+
+    ctrl: bool
+    shift: bool
+
+
+_CTRL = (imgui.Key.left_ctrl, imgui.Key.right_ctrl)
+_SHIFT = (imgui.Key.left_shift, imgui.Key.right_shift)
+
+
+def _pressed(name: str, typed: str, typing: bool, held: _Held) -> bool:
     if name in _CHARACTERS:
-        return name in typed and not ctrl
-    cap = name.removeprefix("Ctrl+")
-    if ctrl != (cap != name) or (typing and not ctrl and name not in _WHILE_TYPING):
+        return name in typed and not held.ctrl
+    ctrl, shift, cap = "Ctrl+" in name, "Shift+" in name, name.rsplit("+", 1)[-1]
+    if (held.ctrl, held.shift) != (ctrl, shift) or (typing and not held.ctrl and name not in _WHILE_TYPING):
         return False
     return any(imgui.is_key_pressed(key, name in _REPEATING) for key in _KEYS[cap])
 
 
-def _ctrl_just_released() -> bool:
-    """In a slow frame both Ctrl and the key may come up again; the key still counts as pressed with Ctrl."""
-    return imgui.is_key_released(imgui.Key.left_ctrl) or imgui.is_key_released(imgui.Key.right_ctrl)
+def _or_just_released(held: bool, keys: tuple[imgui.Key, ...]) -> bool:
+    """In a slow frame both keys of a chord may come up again; they still count as pressed together."""
+    return held or any(imgui.is_key_released(key) for key in keys)

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app import extras_panel, keyboard, overlays, picture, sidebar, statusbar, theme
+from app import keyboard, overlays, picture, sidebar, statusbar, theme
 from app.commands import Context, Request
 from app.geometry import Size, place
 from app.layout import Layout, lay_out
 from app.readout import Readout
+from app.sidebar import extras
 from app.state import Look, ViewState
 
 _NO_PICTURE: Size = (1, 1)
@@ -48,7 +49,7 @@ def draw(
     elif readout.loading is None and not covered:
         overlays.start(area, context, fonts)
     if layout.panel is not None:
-        panel = extras_panel if readout.captions else sidebar
+        panel = extras if readout.captions else sidebar
         panel.draw(layout.panel, context, readout, fonts)
     statusbar.draw(layout.status, state, readout, place(state.zoom, size, area).scale)
     overlays.loading(area, context, readout)

@@ -44,6 +44,15 @@ _SINGLE_CORNER = {
 }
 
 
+class Tab(Enum):
+    """The tabs of the panel; the value is the name on screen."""
+
+    LOOK = "Look"
+    COMPARE = "Compare"
+    FOCUS = "Focus"
+    EXPORT = "Export"
+
+
 class Step(Enum):
     """How good the picture on screen is; the value is its name on screen."""
 
@@ -127,6 +136,7 @@ class ViewState:
     model: str = ""  # for a hand at rest; empty: the one that the program was started with
     foresight: bool = True  # compute views that may be wanted next while nothing else is to be done
     panel: bool = True
+    tab: Tab = Tab.LOOK
     help: bool = False
     path_field: bool = False
     path_text: str = ""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
-from app.extras_panel import focus_text
 from app.geometry import Rect
 from app.readout import Readout
+from app.sidebar.extras import focus_text
 from app.state import STEP_MEANING, Step, ViewState
 from app.widgets import em, milliseconds, number, packed, text, tooltip, window
 

@@ -143,6 +143,42 @@ def tile(label: str, command: str, selected: bool, context: commands.Context, wi
     _choice(label, command, selected, context, width, theme.FIELD)
 
 
+def tab(label: str, command: str, selected: bool, context: commands.Context, width: float, fonts: theme.Fonts) -> None:
+    """One of a row of tabs that run the named command: its name in the middle, a line under the chosen one."""
+    height = imgui.get_frame_height()
+    corner = imgui.get_cursor_screen_pos()
+    if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
+        commands.run(command, context)
+    hovered = imgui.is_item_hovered()
+    tooltip(commands.COMMANDS[command].tooltip)
+    brush = imgui.get_window_draw_list()
+    end = ImVec2(corner.x + width, corner.y + height)
+    brush.add_rect_filled(
+        corner, end, packed(theme.FIELD_HOVERED if hovered else theme.FIELD), imgui.get_style().frame_rounding
+    )
+    if selected:
+        line = ImVec2(corner.x + em() * 0.3, end.y - em() * 0.13)
+        brush.add_rect_filled(line, ImVec2(end.x - em() * 0.3, end.y), packed(theme.ACCENT))
+    with font(fonts.bold if selected else fonts.regular, theme.SMALL):
+        size = imgui.calc_text_size(label)
+        middle = ImVec2(corner.x + (width - size.x) / 2, corner.y + (height - size.y) / 2)
+        brush.add_text(middle, packed(theme.TEXT if selected else theme.TEXT_SOFT), label)
+
+
+def pairs(name: str, rows: Sequence[tuple[str, str]]) -> None:
+    """Names, and beside them their values in a column."""
+    imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 1))
+    if imgui.begin_table(name, 2):
+        for label, value in rows:
+            imgui.table_next_row()
+            imgui.table_next_column()
+            text(label, theme.TEXT_SOFT)
+            imgui.table_next_column()
+            text(value)
+        imgui.end_table()
+    imgui.pop_style_var()
+
+
 def _choice(label: str, command: str, selected: bool, context: commands.Context, width: float, ground: ImVec4) -> None:
     height = imgui.get_frame_height()
     corner = imgui.get_cursor_screen_pos()

@@ -8,7 +8,7 @@ from app import theme
 from app.commands import Context
 from app.geometry import Rect
 from app.readout import Caption, Readout
-from app.sidebar import open_and_close
+from app.sidebar.header import open_and_close
 from app.state import ViewState
 from app.widgets import FIXED, button, elided, font, heading, number, slider, text, tooltip, window, wrapped
 

@@ -1,0 +1,7 @@
+"""Textures, passes and read-back: the only place that knows moderngl."""
+
+from app.canvas.canvas import Canvas
+from app.canvas.contexts import standalone_context, windowed_context
+from app.canvas.frame import BACKGROUND, Frame, Target
+
+__all__ = ["BACKGROUND", "Canvas", "Frame", "Target", "standalone_context", "windowed_context"]

@@ -1,0 +1,242 @@
+"""The picture in the window.
+
+Every way of looking is a shader over the same textures: the four corner views, the newest synthesis with its disparity
+map, the synthesis before it, and the captured view. Nothing shown is computed on the CPU. What is shown is made at the
+light field's own size in 8 bits, as the screen has, and only when it has changed; the window then magnifies it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from app.canvas.compared import Compared
+from app.canvas.frame import BACKGROUND, Frame, Target
+from app.canvas.inside import Inside
+from app.canvas.magnifier import Magnifier
+from app.canvas.passes import TONES, Passes
+from app.canvas.placing import shown_size
+from app.canvas.synthesized import Synthesized
+from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
+from app.geometry import Placement, Point, Rect, Size
+from app.state import Look
+from lfcore.errors import InputError
+from lfcore.lightfield import FloatArray
+
+_Bytes = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class _Makers:
+    """What there is of one light field, and what makes pictures of it."""
+
+    textures: Textures
+    synthesized: Synthesized
+    inside: Inside
+    compared: Compared
+
+    @staticmethod
+    def of(passes: Passes, textures: Textures) -> _Makers:
+        synthesized = Synthesized(passes, textures)
+        return _Makers(
+            textures, synthesized, Inside(passes, textures, synthesized), Compared(passes, textures, synthesized)
+        )
+
+
+class Canvas:
+    """The picture in the window. All methods need the GL context to be current, on the thread that made the canvas.
+
+    `picture_type`: moderngl's type of the pictures that are shown; "f1" is 8 bits, "f4" float32 to read them back exactly.
+    """
+
+    def __init__(self, context: moderngl.Context, picture_type: str = "f1") -> None:
+        self.context = context
+        self.passes = Passes(context)
+        self._picture_type = picture_type
+        for fragment in ("blend.frag", "instant.frag", "exact.frag", "fade.frag"):
+            self.passes.get(fragment)  # compiled now, so that the hand's first movement does not wait for them
+        for fade in ("fade_none.glsl", "fade_older.glsl"):
+            self.passes.get("carried.frag", fade=fade)
+        self._magnifier = Magnifier(context, self.passes)
+        # Bound before framebuffers are released: moderngl would otherwise go on binding one that is gone.
+        self._resting_place = context.simple_framebuffer((1, 1))
+        self._makers: _Makers | None = None
+        self._exhibit: moderngl.Texture | None = None  # what is shown in place of a light field
+
+    # What there is to draw.
+
+    def set_light_field(self, corners: npt.NDArray[np.generic]) -> None:
+        """Take the corner views (4, H, W, 3) in the order of CORNERS, uint8, uint16 or float32 as stored."""
+        height, width = corners.shape[1:3]
+        largest = int(self.context.info["GL_MAX_TEXTURE_SIZE"]) // 2  # the sheet of all four is twice as large
+        if max(height, width) > largest:
+            raise InputError(
+                f"The views are {width} x {height} px, but this computer's graphics show at most {largest} px a side; "
+                f"open a light field with smaller views."
+            )
+        self.clear()
+        self._makers = _Makers.of(self.passes, Textures(self.context, corners, self._picture_type))
+
+    def warm_up(self) -> None:
+        """Run every pass of the moving picture once on a made-up light field; there must be no other.
+
+        Software rasterisers compile a shader when it is first run on certain kinds of texture, which can take half a second:
+        the hand would feel it in its first movement.
+        """
+        self.set_light_field(np.zeros((4, 2, 2, 3), np.uint8))
+        image, pixels, disparity = np.zeros((2, 2, 3), np.float32), np.zeros((2, 2, 4), np.uint8), np.zeros((2, 2), np.float32)
+        here, near, far = (0.5, 0.5), (0.5, 0.45), (0.5, 0.1)
+        self.prepare(Frame(Look.SYNTHESIS, here))
+        for share in (0.5, 1.0):  # fading in over nothing, then over the one before
+            self.set_synthesis(image, pixels, disparity, here)
+            for viewpoint in (here, near, far):
+                self.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
+        self.prepare(Frame(Look.SYNTHESIS, near, share=0.5))
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the light field and everything that belongs to it."""
+        self._resting_place.use()
+        if self._makers is not None:
+            self._makers.textures.release()
+            self._makers = None
+
+    def set_synthesis(self, image: FloatArray, pixels: _Bytes, disparity: FloatArray | None, viewpoint: Point) -> None:
+        """Take the newest synthesis: image (H, W, 3), the same as uint8 (H, W, 4), disparity (H, W) in px over the baseline
+        or None, and its (u, v).
+
+        The one before is kept for the cross-fade. Both are carried in 8 bits, which costs a software rasteriser half the time.
+        """
+        textures = self._at_hand.textures
+        textures.older_at, textures.newest_at = textures.newest_at, viewpoint
+        textures.newest = 1 - textures.newest
+        width, height = textures.size
+        textures.syntheses.write(pixels, viewport=(0, 0, textures.newest, width, height, 1))
+        textures.exact.write(np.ascontiguousarray(image, np.float32))
+        if disparity is not None:
+            textures.disparity_map.write(np.ascontiguousarray(disparity, np.float32))
+            textures.nearest_disparity = float(disparity.min())
+            textures.made_at = viewpoint
+        textures.current.clear()
+
+    def set_captured(self, view: npt.NDArray[np.generic]) -> None:
+        """Take the captured view (H, W, 3), as stored, to be compared with or looked at."""
+        self._at_hand.textures.captured.write(np.ascontiguousarray(view))
+        self._at_hand.textures.current.clear()
+
+    def set_exhibit(self, pixels: npt.NDArray[np.generic]) -> None:
+        """Take a picture (H, W, 3), uint8, or a map (H, W), float32, that is shown as it is in place of a light field."""
+        height, width = pixels.shape[:2]
+        largest = int(self.context.info["GL_MAX_TEXTURE_SIZE"])
+        if max(height, width) > largest:
+            raise InputError(
+                f"The picture is {width} x {height} px, but this computer's graphics show at most {largest} px a side; "
+                f"write it out with `lfview info FILE --extract DIR` and look at it elsewhere."
+            )
+        self.clear_exhibit()
+        components = pixels.shape[2] if pixels.ndim == 3 else 1
+        self._exhibit = make_texture(self.context, (width, height), components, TEXTURE_TYPES[pixels.dtype.name])
+        self._exhibit.write(np.ascontiguousarray(pixels))
+
+    def clear_exhibit(self) -> None:
+        """Forget that picture or map."""
+        if self._exhibit is not None:
+            self._exhibit.release()
+            self._exhibit = None
+
+    @property
+    def has_light_field(self) -> bool:
+        """Whether there is a picture to draw."""
+        return self._makers is not None
+
+    @property
+    def has_disparity(self) -> bool:
+        """Whether a disparity map has been taken for this light field."""
+        return self._makers is not None and self._makers.textures.made_at is not None
+
+    def picture_size(self, look: Look) -> Size:
+        """(width, height) in pixels of what this look shows."""
+        return shown_size(self._at_hand.textures.size, look)
+
+    # Drawing.
+
+    def begin(self, target: Target, rectangles: Sequence[tuple[Rect, tuple[float, float, float]]] = ()) -> None:
+        """Start a frame: all of the target in the background colour, and rectangles (in its pixels, y downwards) in others.
+
+        Clearing is the cheapest way of filling that there is, which counts where the processor draws.
+        """
+        framebuffer, (width, height) = target.framebuffer, target.size
+        framebuffer.viewport = framebuffer.scissor = (0, 0, width, height)
+        framebuffer.use()
+        framebuffer.clear(*BACKGROUND, 1.0)
+        for area, colour in rectangles:
+            left, right = round(area.x), round(area.x + area.width)
+            top, bottom = round(area.y), round(area.y + area.height)
+            framebuffer.clear(*colour, 1.0, viewport=(left, height - bottom, right - left, bottom - top))
+
+    def prepare(self, frame: Frame) -> bool:
+        """Make the picture at the light field's own size that the frame shows; whether it was not up to date."""
+        made = self._at_hand.textures.made
+        self._texture_of(frame)
+        return self._at_hand.textures.made != made
+
+    def draw(self, frame: Frame, target: Target, area: Rect, placement: Placement) -> None:
+        """Draw the frame's picture into the target, inside the area (in its pixels, y downwards), at the placement."""
+        texture = self._texture_of(frame)
+        if frame.look is Look.DISPARITY:
+            self._magnifier.map(texture, frame.disparity_range, target, area, placement)
+        else:
+            self._magnifier.image(texture, frame.dim, target, area, placement)
+
+    def draw_exhibit(self, target: Target, area: Rect, placement: Placement, values: tuple[float, float] | None) -> None:
+        """Draw the exhibit into the target as `draw` does; of a map, `values` are those of the first and the last colour."""
+        assert self._exhibit is not None
+        if values is None:
+            self._magnifier.image(self._exhibit, 1.0, target, area, placement)
+        else:
+            self._magnifier.map(self._exhibit, values, target, area, placement)
+
+    def read(self, frame: Frame) -> FloatArray:
+        """What `draw` would show of this frame at one window pixel per picture pixel: float32 (H, W, 3)."""
+        width, height = self.picture_size(frame.look)
+        texture = self.context.texture((width, height), 4, dtype="f4")
+        framebuffer = self.context.framebuffer([texture])
+        try:
+            target = Target(framebuffer, (width, height))
+            self.draw(frame, target, Rect(0, 0, width, height), Placement(1.0, (0.0, 0.0)))
+            values = np.frombuffer(framebuffer.read(components=3, dtype="f4"), np.float32)
+        finally:
+            self._resting_place.use()
+            framebuffer.release()
+            texture.release()
+        return values.reshape(height, width, 3)[::-1].copy()  # GL's first row is the lowest
+
+    def timer(self) -> moderngl.Query:
+        """A timer of what is drawn within it, by the graphics' own clock; read it one frame later, so that nothing waits."""
+        return self.context.query(time=True)
+
+    def _texture_of(self, frame: Frame) -> moderngl.Texture:
+        """The picture, or the map, at the light field's own size."""
+        makers, tone = self._at_hand, TONES[frame.display_tone]
+        if frame.look is Look.DISPARITY:
+            return makers.synthesized.carry_disparity(frame.viewpoint)
+        if frame.look is Look.WARPED_ALL:
+            return makers.inside.sheet(frame.viewpoint, tone)
+        if frame.look.corner is not None:
+            return makers.inside.warped(frame.look.corner, frame.viewpoint, tone)
+        if frame.look is Look.ERROR:
+            return makers.compared.error(frame.viewpoint, frame.share, frame.gain)
+        if frame.captured:
+            textures = makers.textures
+            return makers.synthesized.copied(textures.picture, textures.captured, 0, tone).texture
+        return makers.synthesized.picture(frame.viewpoint, frame.share, tone).texture
+
+    @property
+    def _at_hand(self) -> _Makers:
+        if self._makers is None:
+            raise RuntimeError("the canvas has no light field")
+        return self._makers

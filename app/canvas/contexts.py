@@ -1,0 +1,26 @@
+"""GL contexts: a window's, and one without any window."""
+
+from __future__ import annotations
+
+import moderngl
+
+from lfcore.errors import LfviewError
+
+GL_VERSION = 330
+
+
+def windowed_context(load_function: object) -> moderngl.Context:
+    """The GL context that is current on this thread; `load_function` has a method load_opengl_function(name) -> address."""
+    moderngl.init_context(load_function)
+    return moderngl.get_context()
+
+
+def standalone_context() -> moderngl.Context:
+    """A GL context without any window, through EGL; raises LfviewError where there is none."""
+    try:
+        return moderngl.create_standalone_context(require=GL_VERSION, backend="egl")  # type: ignore[arg-type]  # its stub is wrong
+    except Exception as error:  # moderngl and glcontext raise bare Exceptions here
+        raise LfviewError(
+            f"Found no OpenGL 3.3 for drawing off screen ({error}); install EGL and a driver "
+            f"(on Debian: libegl1 and libgl1-mesa-dri)."
+        ) from error

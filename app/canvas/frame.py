@@ -1,0 +1,34 @@
+"""What the canvas is to draw, and into what, by value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+
+from app.geometry import Point, Size
+from app.state import Look
+
+BACKGROUND = (0.055, 0.058, 0.063)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture: the way of looking, and all that it depends on."""
+
+    look: Look
+    viewpoint: Point
+    share: float = 1.0  # how far the newest synthesis has been faded in over what was there before
+    captured: bool = False  # the camera's own view in place of a synthesis
+    display_tone: bool = False
+    gain: float = 1.0
+    disparity_range: tuple[float, float] = (0.0, 1.0)
+    dim: float = 1.0
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is drawn into: a framebuffer and its (width, height). A window's framebuffer does not know its own size."""
+
+    framebuffer: moderngl.Framebuffer
+    size: Size

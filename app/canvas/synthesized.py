@@ -1,0 +1,106 @@
+"""The picture of a viewpoint: the newest synthesis, the one before it and the corner views, carried and mixed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import moderngl
+
+from app.canvas.passes import AnyTexture, Passes, Uniform
+from app.canvas.textures import Picture, Textures
+from app.geometry import Point
+from app.state import carried_share
+
+
+class Synthesized:
+    """Makes the picture of a viewpoint at the light field's own size. Each part is made anew only if what it shows has
+    changed. `tone`: the shader file that turns stored values into shown ones."""
+
+    def __init__(self, passes: Passes, textures: Textures) -> None:
+        self._passes = passes
+        self._textures = textures
+
+    def picture(self, viewpoint: Point, share: float, tone: str) -> Picture:
+        """The best picture of this viewpoint that can be made. share: how far the newest synthesis has been faded in."""
+        textures = self._textures
+        newest, older = textures.newest_at, textures.older_at if share < 1.0 else None
+        if newest is None:
+            return self._corners(viewpoint, False, tone)
+        if newest == viewpoint and older in (viewpoint, None):
+            after = self.copied(textures.after, textures.exact, 0, tone)
+            if share >= 1.0:
+                return after
+            if older is not None:
+                before = self.copied(textures.before, textures.syntheses, 1 - textures.newest, tone)
+                return self._mixed(before, after, share)
+            return self._mixed(self._corners(viewpoint, False, tone), after, share)
+        if textures.made_at != newest:  # it has come without a disparity map, and so cannot be carried
+            return self._corners(viewpoint, textures.made_at is not None, tone)
+        near = carried_share(math.dist(newest, viewpoint))
+        if near <= 0.0:
+            return self._corners(viewpoint, True, tone)
+        after = self._carried(viewpoint, older, share, tone)
+        if share < 1.0 and older is None:
+            return self._mixed(self._corners(viewpoint, False, tone), after, share * near)
+        return after if near >= 1.0 else self._mixed(self._corners(viewpoint, True, tone), after, near)
+
+    def copied(self, result: Picture, source: moderngl.TextureArray, layer: int, tone: str) -> Picture:
+        """A layer of these pictures, pixel by pixel."""
+        if result.outdated("copy of", source, layer, tone):
+            result.target.use()
+            self._passes.get("exact.frag", tone=tone).render({"pictures": source}, {"layer": layer})
+        return result
+
+    def carry_disparity(self, viewpoint: Point) -> moderngl.Texture:
+        """The newest disparity map, carried to the viewpoint: px over the baseline."""
+        textures = self._textures
+        if textures.made_at is not None and textures.outdated("disparity", viewpoint):
+            textures.disparity_target.use()
+            self._passes.get("carry.frag").render({"disparity_map": textures.disparity_map}, self._carrying(viewpoint))
+        return textures.disparity
+
+    def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: str) -> Picture:
+        """The newest synthesis, and where `older` is given also that one, carried to the viewpoint."""
+        textures = self._textures
+        result = textures.after
+        if not result.outdated("carried", viewpoint, older, share, tone):
+            return result
+        uniforms: dict[str, Uniform] = {**self._carrying(viewpoint), "newest": textures.newest}
+        fade = "fade_none.glsl"
+        if older is not None:
+            fade = "fade_older.glsl"
+            uniforms |= {"older_at": older, "share": share}
+        result.target.use()
+        sampled: Mapping[str, AnyTexture] = {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}
+        self._passes.get("carried.frag", fade=fade, tone=tone).render(sampled, uniforms)
+        return result
+
+    def _corners(self, viewpoint: Point, warped: bool, tone: str) -> Picture:
+        """The four corner views, blended as they are or warped by the newest disparity."""
+        textures = self._textures
+        result = textures.before
+        if not result.outdated("corners", viewpoint, warped, tone):
+            return result
+        result.target.use()
+        views: dict[str, AnyTexture] = {"corner_views": textures.corner_views}
+        if warped:
+            sampled = views | {"disparity_map": textures.disparity_map}
+            self._passes.get("instant.frag", tone=tone).render(sampled, self._carrying(viewpoint))
+        else:
+            self._passes.get("blend.frag", tone=tone).render(views, {"viewpoint": viewpoint})
+        return result
+
+    def _mixed(self, before: Picture, after: Picture, share: float) -> Picture:
+        result = self._textures.picture
+        if result.outdated("mixed", before.made_for, after.made_for, share):
+            result.target.use()
+            self._passes.get("fade.frag").render({"before": before.texture, "after": after.texture}, {"share": share})
+        return result
+
+    def _carrying(self, viewpoint: Point) -> dict[str, Uniform]:
+        """The uniforms of carry.glsl and the viewpoint."""
+        textures = self._textures
+        made_at = textures.made_at
+        assert made_at is not None
+        return {"made_at": made_at, "nearest_disparity": textures.nearest_disparity, "viewpoint": viewpoint}

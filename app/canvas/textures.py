@@ -1,0 +1,87 @@
+"""The textures of one light field, and what passes draw into. Pictures lie in textures with their first row first."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry import Point, Size
+from lfcore.lightfield import CORNERS
+
+TEXTURE_TYPES = {"uint8": "f1", "uint16": "nu2", "float32": "f4"}  # numpy type to moderngl's normalised texture type
+
+
+class Picture:
+    """A texture that a pass draws into, and what it was last drawn for."""
+
+    def __init__(self, context: moderngl.Context, size: Size, dtype: str, owner: Textures) -> None:
+        self.texture = make_texture(context, size, 4, dtype)
+        self.target = context.framebuffer([self.texture])
+        self._owner = owner
+
+    def outdated(self, *made_for: object) -> bool:
+        """Whether the picture was last made for something else; it counts as made for this from now on."""
+        return self._owner.outdated(self, *made_for)
+
+    @property
+    def made_for(self) -> tuple[object, ...]:
+        """What it was last made for."""
+        return self._owner.current.get(self, ())
+
+    def release(self) -> None:
+        """Give the memory of the graphics back."""
+        self.target.release()
+        self.texture.release()
+
+
+class Textures:
+    """The textures of one light field, and the framebuffers of the passes at its size."""
+
+    def __init__(self, context: moderngl.Context, corners: npt.NDArray[np.generic], picture_type: str) -> None:
+        height, width = corners.shape[1:3]
+        stored = TEXTURE_TYPES[corners.dtype.name]
+        self.size: Size = (width, height)
+        self.corner_views = context.texture_array(
+            (width, height, len(CORNERS)), 3, np.ascontiguousarray(corners).tobytes(), alignment=1, dtype=stored
+        )
+        self.captured = context.texture_array((width, height, 1), 3, alignment=1, dtype=stored)
+        self.exact = context.texture_array((width, height, 1), 3, alignment=1, dtype="f4")  # the newest synthesis
+        self.syntheses = context.texture_array((width, height, 2), 4)  # the newest one and the one before, in 8 bits
+        self.newest = 0  # layer of `syntheses`
+        self.newest_at: Point | None = None  # viewpoint of the newest synthesis
+        self.older_at: Point | None = None
+        self.disparity_map = make_texture(context, self.size, 1, "f4")
+        self.made_at: Point | None = None  # viewpoint of disparity_map
+        self.nearest_disparity = 0.0
+        self.disparity = make_texture(context, self.size, 1, "f4")
+        self.disparity_target = context.framebuffer([self.disparity])
+        self.before = Picture(context, self.size, picture_type, self)
+        self.after = Picture(context, self.size, picture_type, self)
+        self.picture = Picture(context, self.size, picture_type, self)
+        self.sheet = Picture(context, (2 * width, 2 * height), picture_type, self)
+        self.precise = Picture(context, self.size, "f4", self)
+        self.made = 0  # how often a target was made
+        self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
+
+    def outdated(self, target: object, *made_for: object) -> bool:
+        """Whether the target was last made for something else; it counts as made for this from now on."""
+        if self.current.get(target) == made_for:
+            return False
+        self.current[target] = made_for
+        self.made += 1
+        return True
+
+    def release(self) -> None:
+        """Give the memory of the graphics back."""
+        for value in vars(self).values():
+            if isinstance(value, moderngl.Framebuffer | moderngl.Texture | moderngl.TextureArray | Picture):
+                value.release()
+
+
+def make_texture(context: moderngl.Context, size: Size, components: int, dtype: str) -> moderngl.Texture:
+    """An empty texture that is sampled linearly and not repeated."""
+    texture = context.texture(size, components, alignment=1, dtype=dtype)
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = False
+    return texture

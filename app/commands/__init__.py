@@ -1,0 +1,58 @@
+"""Everything that can be done by a key: one table for the keys themselves, the tooltips of the controls and the F1 page."""
+
+from __future__ import annotations
+
+from app.commands import looking, moving, program, tabs, zooming
+from app.commands.kinds import (
+    LOOKING,
+    MOVING,
+    PROGRAM,
+    ZOOMING,
+    Action,
+    Command,
+    Context,
+    Needs,
+    OpenPath,
+    Request,
+)
+from app.commands.moving import NUDGE
+
+__all__ = [
+    "COMMANDS",
+    "GESTURES",
+    "LOOKING",
+    "MOVING",
+    "NUDGE",
+    "PROGRAM",
+    "ZOOMING",
+    "Action",
+    "Command",
+    "Context",
+    "Needs",
+    "OpenPath",
+    "Request",
+    "run",
+]
+
+COMMANDS: dict[str, Command] = {
+    **looking.COMMANDS,
+    **moving.COMMANDS,
+    **zooming.COMMANDS,
+    **tabs.COMMANDS,
+    **program.COMMANDS,
+}
+
+# What the mouse does, for the F1 page.
+GESTURES: tuple[tuple[str, str, str], ...] = (
+    (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
+    (ZOOMING, "Wheel", "Zoom about the cursor"),
+    (ZOOMING, "Right drag, Space + drag", "Move the picture"),
+    (PROGRAM, "Drop", "Open a file or folder"),
+)
+
+
+def run(name: str, context: Context) -> None:
+    """Do the named thing, unless what it needs is not open."""
+    command = COMMANDS[name]
+    if command.needs in context.met:
+        command.run(context)

@@ -1,0 +1,11 @@
+"""The tab Focus: refocusing, slices and stereo."""
+
+from __future__ import annotations
+
+from app import theme
+from app.commands import Context
+from app.readout import Readout
+
+
+def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
+    """The whole tab."""
