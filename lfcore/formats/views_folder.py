@@ -27,7 +27,7 @@ def sniff(path: Path) -> bool:
     if path.is_dir():
         return True
     try:
-        return path.suffix.lower() in EXTENSIONS and belongs_to_grid(path, _pictures(path.parent))
+        return path.suffix.lower() in EXTENSIONS and belongs_to_grid(path, pictures_in(path.parent))
     except InputError:
         return False
 
@@ -43,8 +43,7 @@ def read(
     where `cancelled` says so.
     """
     given = path if path.is_dir() else path.parent
-    folder = _folder_of_views(given)
-    grid = find_grid(folder, _pictures(folder))
+    grid = grid_of(path)
     first = grid.files[0, 0]
     header = read_header(first)
     check_memory(first, header, grid.rows * grid.columns)
@@ -57,8 +56,8 @@ def read(
     facts = dict(grid.facts)
     if header.channels == 1:
         facts["Colour"] = "grey pictures, the one channel repeated"
-    if folder != given:
-        facts["Folder"] = str(folder)
+    if first.parent != given:
+        facts["Folder"] = str(first.parent)
     light_field = LightField(
         views=views,
         name=given.resolve().name,
@@ -71,7 +70,13 @@ def read(
     return _checked_against_pictures(light_field)
 
 
-def _pictures(folder: Path) -> list[Path]:
+def grid_of(path: Path) -> Grid:
+    """Which files are the views of this folder, or of the folder around the given view. Raises InputError."""
+    folder = _folder_of_views(path if path.is_dir() else path.parent)
+    return find_grid(folder, pictures_in(folder))
+
+
+def pictures_in(folder: Path) -> list[Path]:
     """The files of a folder that have a picture's extension; hidden ones are left out (macOS leaves ._name files)."""
     try:
         return [
@@ -85,9 +90,9 @@ def _pictures(folder: Path) -> list[Path]:
 
 def _folder_of_views(folder: Path) -> Path:
     """`folder` itself if it holds pictures, else its only sub-folder that does."""
-    if _pictures(folder):
+    if pictures_in(folder):
         return folder
-    inner = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and _pictures(entry)]
+    inner = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and pictures_in(entry)]
     if len(inner) == 1:
         return inner[0]
     if inner:

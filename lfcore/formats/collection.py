@@ -1,0 +1,84 @@
+"""Folders that hold several light fields, to choose from."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from lfcore.errors import InputError
+from lfcore.formats import eslf
+from lfcore.formats.images import EXTENSIONS, read_header
+from lfcore.formats.names import belongs_to_grid
+
+MEMBERS_LIMIT = 5000
+CONTAINERS = (".lfp", ".lfr", ".lfx")
+
+
+def members(folder: Path) -> tuple[Path, ...]:
+    """What in this folder may be a light field, in the order of their names: sub-folders with pictures or light fields in
+    them, files of Lytro cameras, pictures. Empty where the folder is no folder, is a light field itself, or holds none.
+
+    Contents are not looked at, so that a folder of thousands is listed at once. Raises InputError where it cannot be read.
+    """
+    if not folder.is_dir():
+        return ()
+    try:
+        found = sorted((entry for entry in os.scandir(folder) if not entry.name.startswith(".")), key=_by_name)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be read: {error.strerror}; check its permissions.") from error
+    files = [Path(entry.path) for entry in found if entry.is_file()]
+    folders = [Path(entry.path) for entry in found if entry.is_dir()]
+    pictures = [file for file in files if file.suffix.lower() in EXTENSIONS]
+    containers = [file for file in files if file.suffix.lower() in CONTAINERS]
+    if pictures and _is_light_field(pictures, bool(containers)):
+        return ()
+    inner = [each for each in folders if holds_something(each)]
+    if not containers and not pictures and len(inner) == 1 and _holds(inner[0], EXTENSIONS):
+        return ()  # a light field whose views lie one folder deeper
+    chosen = {*containers, *pictures, *inner}
+    return tuple([Path(entry.path) for entry in found if Path(entry.path) in chosen][:MEMBERS_LIMIT])
+
+
+def holds_something(folder: Path) -> bool:
+    """Whether there are pictures or files of Lytro cameras in the folder or in one of those in it."""
+    endings = (*EXTENSIONS, *CONTAINERS)
+    return _holds(folder, endings) or any(_holds(inner, endings) for inner in _folders(folder))
+
+
+def _is_light_field(pictures: list[Path], among_containers: bool) -> bool:
+    """Whether these pictures are the views of one light field, and not one light field each."""
+    if len(pictures) == 1:
+        return not among_containers and not _is_eslf(pictures[0])
+    return not _is_eslf(pictures[0]) and any(belongs_to_grid(picture, pictures) for picture in _one_of_each(pictures))
+
+
+def _one_of_each(pictures: list[Path]) -> list[Path]:
+    """One picture of each way of naming: those of a grid are alike but for their numbers."""
+    return list({re.sub(r"\d+", "#", picture.name): picture for picture in pictures}.values())[:16]
+
+
+def _is_eslf(picture: Path) -> bool:
+    try:
+        return eslf.has_camera_size(read_header(picture))
+    except InputError:
+        return False
+
+
+def _holds(folder: Path, endings: tuple[str, ...]) -> bool:
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        return any(entry.name.lower().endswith(endings) and not entry.name.startswith(".") for entry in found)
+    return False
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        yield from (Path(entry.path) for entry in found if entry.is_dir() and not entry.name.startswith("."))
+
+
+def _by_name(entry: os.DirEntry[str]) -> tuple[list[tuple[int, str]], str]:
+    """Numbers in names count as numbers: IMG_9 before IMG_10."""
+    parts = re.split(r"(\d+)", entry.name.lower())
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], entry.name
