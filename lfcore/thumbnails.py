@@ -1,0 +1,141 @@
+"""Glances kept on disk between runs of the program, so that a folder of captures is looked at once: bounded, checked when read.
+
+One small file a glance, found by where the light field lies, by its size and time, and by the code that looked. Written by
+a rename, removed when it was used longest ago. A file that is not what it should be is removed and counts as never written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lfcore.atomic import atomic_path
+from lfcore.errors import InputError, OutputError
+from lfcore.formats.glance import LONGEST_SIDE, Glance
+from lfcore.kept_files import KeptFile, code_digest, default_root, entries, mark_used, remove
+
+DEFAULT_LIMIT = 64 * 2**20
+_FOLDER = "thumbnails"
+_SUFFIX = ".thumbnail"
+_MAGIC = b"lfview thumbnail 1\n"
+_LARGEST = 2**20
+_DIGEST_BYTES = 16
+_CAPTION_LIMIT = 200
+_LOOKERS = ("lfcore.formats", "lfcore.formats.lytro", "lfcore.decode")
+
+
+@dataclass(frozen=True)
+class ThumbnailStore:
+    """Glances under `folder` (made when first written to), at most `limit_bytes` of them."""
+
+    folder: Path
+    limit_bytes: int = DEFAULT_LIMIT
+
+    def get(self, key: str) -> Glance | None:
+        """The glance under this key; None where there is none, or a damaged one, which is removed."""
+        path = self._path(key)
+        try:
+            with path.open("rb") as file:
+                seen = _unpacked(file.read(_LARGEST + 1))
+        except OSError:
+            return None
+        except (ValueError, KeyError, TypeError, zlib.error):
+            remove(path)
+            return None
+        mark_used(path)
+        return seen
+
+    def put(self, key: str, seen: Glance) -> None:
+        """Keep this glance, and remove those used longest ago where there would be too many. Raises OutputError."""
+        data = _packed(seen)
+        self._make_room(len(data))
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # pictures are nobody else's business
+        except OSError as error:
+            raise OutputError(f"Cannot make the folder {self.folder}: {error.strerror or error}.") from error
+        with atomic_path(self._path(key)) as temporary:
+            temporary.write_bytes(data)
+
+    def usage(self) -> tuple[int, int]:
+        """(thumbnails, bytes) that are kept."""
+        files = self._files()
+        return len(files), sum(file.size for file in files)
+
+    def clear(self) -> None:
+        """Remove all of them."""
+        for file in self._files():
+            remove(file.path)
+
+    def _make_room(self, wanted: int) -> None:
+        files = sorted(self._files(), key=lambda file: file.used_at)
+        excess = sum(file.size for file in files) + wanted - self.limit_bytes
+        for file in files:
+            if excess <= 0:
+                return
+            remove(file.path)
+            excess -= file.size
+
+    def _files(self) -> list[KeptFile]:
+        return [file for file in entries(self.folder) if file.path.name.endswith(_SUFFIX)]
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}{_SUFFIX}"
+
+
+def default_store() -> ThumbnailStore:
+    """Where this user's thumbnails are kept: below lfcore.kept_files.default_root()."""
+    return ThumbnailStore(default_root() / _FOLDER)
+
+
+def key_of(path: Path) -> str:
+    """A key for what lies at this path as it is now: a file by its size and time, a folder by those of the files in it.
+
+    Raises InputError where it cannot be looked at.
+    """
+    digest = hashlib.blake2b(os.fsencode(path.absolute()), digest_size=16)
+    for package in _LOOKERS:
+        digest.update(code_digest(package).encode())
+    try:
+        facts = path.stat()
+        digest.update(repr((facts.st_size, facts.st_mtime_ns)).encode())
+        if path.is_dir():
+            for file in sorted(entries(path), key=lambda file: file.path.name):
+                digest.update(repr((file.path.name, file.size, file.used_at)).encode())
+    except OSError as error:
+        raise InputError(f"{path} cannot be opened: {error.strerror or error}; it may have been moved or removed.") from error
+    return digest.hexdigest()
+
+
+def _packed(seen: Glance) -> bytes:
+    """Magic, length of the header, header (JSON), pixels (deflated), digest of all that."""
+    picture = seen.picture
+    facts = {"caption": seen.caption[:_CAPTION_LIMIT], "size": None if picture is None else picture.shape[:2]}
+    header = json.dumps(facts).encode()
+    pixels = b"" if picture is None else zlib.compress(picture.tobytes(), 1)
+    data = b"".join((_MAGIC, len(header).to_bytes(4, "little"), header, pixels))
+    return data + hashlib.blake2b(data, digest_size=_DIGEST_BYTES).digest()
+
+
+def _unpacked(data: bytes) -> Glance:
+    """The inverse of _packed. Raises ValueError, KeyError, TypeError or zlib.error for anything else."""
+    body, digest = data[:-_DIGEST_BYTES], data[-_DIGEST_BYTES:]
+    if not body.startswith(_MAGIC) or hashlib.blake2b(body, digest_size=_DIGEST_BYTES).digest() != digest:
+        raise ValueError("damaged")
+    start = len(_MAGIC) + 4
+    length = int.from_bytes(body[len(_MAGIC) : start], "little")
+    header = json.loads(body[start : start + length])
+    caption = str(header["caption"])
+    if header["size"] is None:
+        return Glance(None, caption)
+    height, width = (int(side) for side in header["size"])
+    if not (0 < height <= LONGEST_SIDE and 0 < width <= LONGEST_SIDE):
+        raise ValueError("of another size")
+    inflated = zlib.decompressobj()
+    pixels = inflated.decompress(body[start + length :], 3 * height * width)
+    return Glance(np.frombuffer(pixels, np.uint8).reshape(height, width, 3), caption)
