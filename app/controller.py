@@ -7,31 +7,23 @@ readout to the panels.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 from pathlib import Path
-from queue import SimpleQueue
 
 import numpy as np
 import numpy.typing as npt
 
+from app.asking import FOR_NOW, Asking, NotAnswered, Task, Wish
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
+from app.loading import FindPreview, Loading, NotOpened, Open, Opened, Preview
 from app.readout import Readout
 from app.state import CARRIED_NEAR, Grid, Look, Step, ViewState, carried_share
-from app.worker import Cancel, Done, Job, LatestWorker
 from lfcore.cache import rounded
-from lfcore.errors import Cancelled
 from lfcore.lightfield import LightField
-
-Progress = Callable[[float], None]
-Preview = Callable[[Path], LightField | None]
-Opened = LightField | Exhibition
-Open = Callable[[Path, Progress, Cancel], Opened]
 
 REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
 FADE_SECONDS = 0.1
@@ -42,30 +34,7 @@ _FARTHER = 0.02
 # A dragged viewpoint that comes to rest this near to a captured or a cached one goes there: no pixel of an ordinary light
 # field moves visibly by it, and the camera's view or the finished picture is there at once.
 MAGNET_RADIUS = 0.012
-PROGRESS_SECONDS = 0.15
 STOP_SECONDS = 10.0
-# The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
-# It sleeps for a part of every sixtieth of a second, which is then theirs, so this takes nothing from them.
-SYNTHESIS_NICENESS = 5
-
-
-class _Task(Enum):
-    """What the synthesis thread can be asked for."""
-
-    QUICK = "the viewpoint, by the model for a hand that moves"
-    FINAL = "the viewpoint, by the model for a hand at rest"
-    SAVE = "writing a view to disk"
-    FETCH = "bringing a view from disk"
-    AHEAD = "a viewpoint that may be wanted next"
-
-
-_FOR_NOW = (_Task.QUICK, _Task.FINAL)
-
-
-@dataclass(frozen=True)
-class _Wish:
-    task: _Task
-    at: Point
 
 
 class Controller:
@@ -77,7 +46,7 @@ class Controller:
         open_light_field: Open,
         wake: Callable[[], None],
         model: str,
-        preview: Preview = lambda path: None,
+        preview: FindPreview = lambda path: None,
         models: Mapping[str, ModelChoice] | None = None,
     ) -> None:
         self.state = ViewState()
@@ -87,22 +56,12 @@ class Controller:
         self.picture: Answer | None = None  # the same, where it was made for exactly the viewpoint on screen
         self.messages: list[str] = []
         self._engine = engine
-        self._open_light_field = open_light_field
-        self._preview = preview
-        self._previews: SimpleQueue[tuple[Path, LightField]] = SimpleQueue()
+        self._loading = Loading(open_light_field, preview, wake)
+        self._asking = Asking(engine, wake)
         self._previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
         self._models = models or {}
-        self._wake = wake
-        self._loader: LatestWorker[Opened] = LatestWorker("loader", wake)
-        self._synthesis: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
-        self._loading: Path | None = None
-        self._load_ticket = 0
-        self._loaded_share = 0.0
         self._grid: Grid | None = None
-        self._wish: _Wish | None = None  # the latest query
-        self._ticket = 0  # of the latest query
-        self._first_ticket = 0  # of the first query about this light field
         self._next: Answer | None = None  # has come while the one before is still being faded in
         self._shown: Point | None = None  # viewpoint at the last tick
         self._heading: Point = (0.0, 0.0)
@@ -119,46 +78,17 @@ class Controller:
 
     def open(self, path: Path) -> None:
         """Begin to open a light field; one that is still being opened is given up, the one on screen stays until then."""
-
-        def load(cancelled: Cancel) -> Opened:
-            told_at = time.monotonic()
-
-            def progress(share: float) -> None:
-                nonlocal told_at
-                if cancelled():
-                    return
-                self._loaded_share = share
-                if time.monotonic() - told_at > PROGRESS_SECONDS:  # each telling costs a frame
-                    told_at = time.monotonic()
-                    self._wake()
-
-            preview = self._preview(path)
-            if preview is not None and not cancelled():
-                preview.content_key  # noqa: B018
-                self._previews.put((path, preview))
-                self._wake()
-            opened = self._open_light_field(path, progress, cancelled)
-            if isinstance(opened, LightField):
-                opened.content_key  # noqa: B018  # computed here, where it holds up no frame
-            if cancelled():
-                raise Cancelled
-            return opened
-
-        self._loader.cancel_all()
-        self._loading, self._loaded_share = path, 0.0
-        self._load_ticket = self._loader.submit(load)
+        self._loading.begin(path)
 
     def cancel_open(self) -> None:
         """Give up the light field that is being opened."""
-        self._loader.cancel_all()
-        self._loading = None
+        self._loading.cancel()
         if self._previewing:
             self._take(None)
 
     def close(self) -> None:
         """Put the light field away; the start picture appears."""
         self.cancel_open()
-        self._synthesis.cancel_all()
         self._take(None)
 
     def show_light_field(self, light_field: LightField) -> None:
@@ -178,14 +108,14 @@ class Controller:
     def touch(self) -> None:
         """The person does something: whatever is being computed ahead stops at once."""
         self._acted = True
-        if self._wish is not None and self._wish.task is _Task.AHEAD:
-            self._synthesis.cancel_all()
-            self._wish = None
+        wish = self._asking.wish
+        if wish is not None and wish.task is Task.AHEAD:
+            self._asking.give_up()
 
     def stop(self) -> None:
         """End the threads, waiting a little for work that cannot be broken off at once."""
-        self._loader.stop(STOP_SECONDS)
-        self._synthesis.stop(STOP_SECONDS)
+        self._loading.stop(STOP_SECONDS)
+        self._asking.stop(STOP_SECONDS)
 
     # Once a frame.
 
@@ -210,7 +140,8 @@ class Controller:
             answer, self._next = self._next, None
             self._accept(answer)
         if not self._previewing:
-            self._ask(self.light_field)
+            useless = self._resting and self._newest_disparity  # what was asked for elsewhere, to be carried here
+            self._asking.ask(self.light_field, self._wanted(self.light_field), useless)
 
     @property
     def viewpoint(self) -> Point:
@@ -289,8 +220,8 @@ class Controller:
             step_ms=self._step_ms(instant_ms),
             from_cache=answer is not None and answer.kept and self.step is answer.step,
             busy=self._busy(),
-            loading=self._loaded_share if self._loading is not None else None,
-            loading_name=self._loading.name if self._loading is not None else "",
+            loading=self._loading.share if self._loading.path is not None else None,
+            loading_name=self._loading.path.name if self._loading.path is not None else "",
             messages=tuple(self.messages),
             score=answer.score if answer else None,
             timings=tuple(newest.synthesis.timings.items()) if newest else (),
@@ -313,9 +244,8 @@ class Controller:
         choice = self._models[name]
         self._model = name
         self._engine.use(name, choice.make, choice.stands_in)
-        self._synthesis.cancel_all()
-        self._wish = self._next = None
-        self._first_ticket = self._ticket + 1
+        self._asking.forget()
+        self._next = None
         self._faulted = False
         if self.newest is not None:
             self.newest = replace(self.newest, final=False)
@@ -346,9 +276,9 @@ class Controller:
         self.state.exhibit = self.exhibition.first if self.exhibition is not None else 0
         self._previewing = False
         self.newest = self.picture = self._next = None
-        self._wish = self._shown = None
+        self._asking.forget()
+        self._shown = None
         self._heading = (0.0, 0.0)
-        self._first_ticket = self._ticket + 1
         self._grid = None
         self._cached = {}
         self._faulted = False
@@ -362,33 +292,24 @@ class Controller:
             self._cached = dict.fromkeys(self._engine.cached_positions(light_field))
 
     def _collect(self) -> None:
-        while not self._previews.empty():
-            path, preview = self._previews.get()
-            if self._loading == path:
-                self._synthesis.cancel_all()
-                self._take(preview)
+        for loaded in self._loading.news():
+            if isinstance(loaded, Preview):
+                self._take(loaded.light_field)
                 self._previewing = True
-        while not self._loader.outcomes.empty():
-            loaded = self._loader.outcomes.get()
-            if self._loading is None or loaded.ticket != self._load_ticket:
-                continue  # given up in the meantime
-            self._loading = None
-            if isinstance(loaded, Done):
-                self._synthesis.cancel_all()
-                self._take(loaded.value)
-            else:
+            elif isinstance(loaded, NotOpened):
                 if self._previewing:
                     self._take(None)
                 self.say(loaded.message)
-        while not self._synthesis.outcomes.empty():
-            answered = self._synthesis.outcomes.get()
-            if not isinstance(answered, Done):
+            else:
+                self._take(loaded)
+        for answered in self._asking.news():
+            if isinstance(answered, NotAnswered):
                 self.say(answered.message)
                 self._faulted = True
-            elif answered.ticket >= self._first_ticket and self.light_field is not None:
+            elif self.light_field is not None:
                 self._cached = dict.fromkeys(self._engine.cached_positions(self.light_field))
-                if answered.value is not None:
-                    self._accept(answered.value)
+                if answered.answer is not None:
+                    self._accept(answered.answer)
 
     def _accept(self, answer: Answer) -> None:
         """Show an answer, unless something better is on screen, once what is there has been faded in."""
@@ -438,71 +359,32 @@ class Controller:
         elif self.newest is not None and _viewpoint_of(self.newest) == self.viewpoint:
             self.picture = self.newest
 
-    def _ask(self, light_field: LightField) -> None:
-        """Give the synthesis thread what is wanted most, and break off what is not.
-
-        Where there is a model for a hand that moves, anything else gives way to it at once. Where there is none, a query
-        that runs for another viewpoint goes on while the hand moves, since it serves to be carried, and is given up when
-        the hand rests.
-        """
-        wish = self._wanted(light_field)
-        if wish != self._wish:
-            before, self._wish = self._wish, wish
-            if wish is None:
-                self._synthesis.cancel_all()
-                return
-            self._ticket = self._synthesis.submit(self._job(light_field, wish))
-            if before is not None and before.task is not _Task.QUICK and (self._engine.quick or before.task is _Task.AHEAD):
-                self._synthesis.cancel_before(self._ticket)
-        running = self._synthesis.running
-        useless = self._resting and self._newest_disparity
-        if useless and running is not None and running < self._ticket and not self._engine.quick:
-            self._synthesis.cancel_before(self._ticket)
-
-    def _wanted(self, light_field: LightField) -> _Wish | None:
+    def _wanted(self, light_field: LightField) -> Wish | None:
         here, picture = self.viewpoint, self.picture
         if self._engine.failed:
-            return _Wish(_Task.QUICK, here) if self._engine.quick and picture is None else None
+            return Wish(Task.QUICK, here) if self._engine.quick and picture is None else None
         if picture is None or not picture.final or (picture.score is None and self.captured_here is not None):
             moving = not self._resting or (self.newest is None and not self._faulted)
             if self._engine.quick and moving and (picture is None or not picture.final):
-                return _Wish(_Task.QUICK, here) if picture is None else None
-            return _Wish(_Task.FINAL, here)
+                return Wish(Task.QUICK, here) if picture is None else None
+            return Wish(Task.FINAL, here)
         return self._wanted_later(light_field) if self._resting else None
 
-    def _wanted_later(self, light_field: LightField) -> _Wish | None:
+    def _wanted_later(self, light_field: LightField) -> Wish | None:
         """What there is to do while the hand rests on a finished picture."""
         engine = self._engine
         unsaved = engine.unsaved
         if unsaved is not None:
-            return _Wish(_Task.SAVE, unsaved)
+            return Wish(Task.SAVE, unsaved)
         stored = engine.stored_position(light_field)
         if stored is not None:
-            return _Wish(_Task.FETCH, stored)
+            return Wish(Task.FETCH, stored)
         if not self.state.foresight or not self._quiet or self._grid is None or not engine.has_room(light_field):
             return None
         for point in viewpoints_ahead(self.viewpoint, self._heading, self._grid):
             if rounded(*point) not in self._cached:
-                return _Wish(_Task.AHEAD, point)
+                return Wish(Task.AHEAD, point)
         return None
-
-    def _job(self, light_field: LightField, wish: _Wish) -> Job[Answer | None]:
-        engine, (u, v) = self._engine, wish.at
-
-        def job(cancelled: Cancel) -> Answer | None:
-            if wish.task is _Task.QUICK:
-                return engine.quick_answer(light_field, u, v, cancelled)
-            if wish.task is _Task.FINAL:
-                return engine.answer(light_field, u, v, cancelled)
-            if wish.task is _Task.SAVE:
-                engine.save_one()
-            elif wish.task is _Task.FETCH:
-                engine.fetch(light_field, u, v)
-            else:
-                engine.answer(light_field, u, v, cancelled)
-            return None
-
-        return job
 
     def _magnet(self, light_field: LightField) -> None:
         assert self._grid is not None
@@ -525,11 +407,12 @@ class Controller:
         return instant_ms
 
     def _busy(self) -> str:
-        if self._engine.failed or self._wish is None or not self._synthesis.busy:
+        wish = self._asking.wish
+        if self._engine.failed or wish is None or not self._asking.busy:
             return ""
-        if self._wish.task in _FOR_NOW:
+        if wish.task in FOR_NOW:
             return "synthesizing" if self.newest is not None or self._engine.ready else "loading the networks"
-        if self._wish.task is _Task.AHEAD and self._grid is not None:
+        if wish.task is Task.AHEAD and self._grid is not None:
             captured = captured_viewpoints(self._grid)
             done = sum(rounded(*point) in self._cached for point in captured)
             return f"computing ahead, {done} of {len(captured)}"

@@ -483,7 +483,7 @@ def test_foresight_stops_at_once_when_the_person_does_something_and_may_be_switc
     program.until(lambda: len(program.synthesizer.asked) == 2)
     assert "ahead" in controller.readout(None).busy
     controller.touch()
-    program.until(lambda: not controller._synthesis.busy)  # long before the 60 s are over
+    program.until(lambda: not controller._asking.busy)  # long before the 60 s are over
     program.tick(0.1)
     assert len(program.synthesizer.asked) == 2
     program.tick(1.0)
