@@ -19,6 +19,7 @@ _BARE = (
 # Parts of the window that do not move; app.interface fills their ground, since clearing costs less than drawing.
 FIXED = _BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value | imgui.WindowFlags_.no_background.value
 CARD = _BARE | imgui.WindowFlags_.always_auto_resize.value
+PASSIVE = CARD | imgui.WindowFlags_.no_inputs.value  # a card that is only looked at
 DASH = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 

@@ -1,0 +1,56 @@
+"""Over the picture: what is looked at, and why there may be nothing to see."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app import theme
+from app.commands import Context
+from app.geometry import Rect
+from app.readout import Readout
+from app.state import Look, Step, ViewState
+from app.widgets import PASSIVE, button, card, em, packed, wrapped
+from lfcore.lightfield import is_extrapolated
+
+
+def notices(area: Rect, state: ViewState, readout: Readout) -> None:
+    """Short labels at the top of the picture: what is looked at, and whether it is extrapolated."""
+    labels: list[tuple[str, ImVec4]] = []
+    if readout.step is Step.CAPTURED:
+        labels.append(("Captured view", theme.GOOD))
+    elif state.look is not Look.SYNTHESIS:
+        labels.append((state.look.value, theme.TEXT))
+    if is_extrapolated(state.u, state.v):
+        labels.append(("Extrapolated", theme.WARNING))
+    if state.captured and state.look is Look.SYNTHESIS and readout.captured_here is None:
+        labels.append(("No captured view here", theme.TEXT_SOFT))
+    if not labels or area.height < 6 * em():
+        return
+    brush = imgui.get_background_draw_list()
+    pad_x, pad_y = em() * 0.65, em() * 0.32
+    x = area.x + em()
+    for words, colour in labels:
+        size = imgui.calc_text_size(words)
+        if x + size.x + 2 * pad_x > area.x + area.width:
+            break
+        top = area.y + em()
+        brush.add_rect_filled(
+            ImVec2(x, top), ImVec2(x + size.x + 2 * pad_x, top + size.y + 2 * pad_y), packed(theme.LABEL), em() * 0.35
+        )
+        brush.add_text(ImVec2(x + pad_x, top + pad_y), packed(colour), words)
+        x += size.x + 2 * pad_x + em() * 0.5
+
+
+def missing(area: Rect, context: Context, readout: Readout) -> None:
+    """Why the chosen look has nothing to show, and what to do."""
+    look = context.state.look
+    if look is Look.ERROR and readout.captured_here is None:
+        with card("missing", area, (0.5, 0.5), 24 * em()):
+            wrapped("No captured view at this viewpoint")
+            wrapped("The error is measured against the camera's own views, which are the dots of the pad.", theme.TEXT_SOFT)
+            button("Go to the nearest", "nearest", context)
+    elif look.needs_disparity and not readout.has_disparity:
+        with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
+            wrapped("No disparity yet")
+            why = "It comes with the first synthesis." if readout.busy else f"The model {readout.model} has given none."
+            wrapped(why, theme.TEXT_SOFT)
