@@ -1,4 +1,4 @@
-"""Colours, type and spacing of the interface: calm, dark, neutral around the picture."""
+"""Colours, type and spacing of the interface: calm, neutral around the picture, dark or light."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from pathlib import Path
 
 import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.settings import Theme
 
 FONT_SIZE = 15.0
 SMALL = 13.0
@@ -17,23 +19,43 @@ def colour(code: int, alpha: float = 1.0) -> ImVec4:
     return ImVec4((code >> 16 & 255) / 255, (code >> 8 & 255) / 255, (code & 255) / 255, alpha)
 
 
-BACKGROUND = colour(0x0E0F10)
-PANEL = colour(0x17181A)
-CARD = colour(0x1D1F22)
-LABEL = colour(0x1D1F22, 0.9)
-FIELD = colour(0x26282C)
-FIELD_HOVERED = colour(0x303338)
-FIELD_ACTIVE = colour(0x3A3E45)
-LINE = colour(0x2B2D31)
-TEXT = colour(0xE4E6E9)
-TEXT_SOFT = colour(0xA3A8B0)
-TEXT_FAINT = colour(0x7C828B)
-ACCENT = colour(0x6CB6E8)
-ACCENT_DEEP = colour(0x284A62)
-REALTIME = colour(0xC79BE8)
-GOOD = colour(0x79C48C)
-WARNING = colour(0xE5B567)
-ERROR = colour(0xE8766C)
+# The parts that colours play. These very objects take other values when the theme changes (see `use`), so that whoever
+# holds one draws by the theme of the day. Around the picture all is neutral grey.
+BACKGROUND, PANEL, CARD, LABEL = colour(0), colour(0), colour(0), colour(0)
+FIELD, FIELD_HOVERED, FIELD_ACTIVE, LINE = colour(0), colour(0), colour(0), colour(0)
+TEXT, TEXT_SOFT, TEXT_FAINT = colour(0), colour(0), colour(0)
+ACCENT, ACCENT_DEEP, REALTIME = colour(0), colour(0), colour(0)
+GOOD, WARNING, ERROR = colour(0), colour(0), colour(0)
+
+_PARTS = (
+    (BACKGROUND, colour(0x0E0F10), colour(0xC6C8CB)),
+    (PANEL, colour(0x17181A), colour(0xF1F2F3)),
+    (CARD, colour(0x1D1F22), colour(0xFAFAFB)),
+    (LABEL, colour(0x1D1F22, 0.9), colour(0xFAFAFB, 0.92)),
+    (FIELD, colour(0x26282C), colour(0xE1E3E6)),
+    (FIELD_HOVERED, colour(0x303338), colour(0xD5D8DC)),
+    (FIELD_ACTIVE, colour(0x3A3E45), colour(0xC4C8CE)),
+    (LINE, colour(0x2B2D31), colour(0xD3D6DA)),
+    (TEXT, colour(0xE4E6E9), colour(0x1A1C1F)),
+    (TEXT_SOFT, colour(0xA3A8B0), colour(0x50565F)),
+    (TEXT_FAINT, colour(0x7C828B), colour(0x737983)),
+    (ACCENT, colour(0x6CB6E8), colour(0x1768A3)),
+    (ACCENT_DEEP, colour(0x284A62), colour(0xB9D8EE)),
+    (REALTIME, colour(0xC79BE8), colour(0x7A3FB0)),
+    (GOOD, colour(0x79C48C), colour(0x22733D)),
+    (WARNING, colour(0xE5B567), colour(0x8A5A00)),
+    (ERROR, colour(0xE8766C), colour(0xB8342A)),
+)
+
+
+def use(theme: Theme) -> None:
+    """Draw by this theme from now on."""
+    for part, dark, light in _PARTS:
+        chosen = light if theme is Theme.LIGHT else dark
+        part.x, part.y, part.z, part.w = chosen.x, chosen.y, chosen.z, chosen.w
+
+
+use(Theme.DARK)
 
 
 @dataclass(frozen=True)
@@ -47,9 +69,8 @@ class Fonts:
 def apply(scale: float) -> Fonts:
     """Give the current imgui context its style and fonts; `scale` 1 is 96 dots per inch. Called once per context."""
     style = imgui.get_style()
-    imgui.style_colors_dark()
     _shapes(style)
-    _colours(style)
+    change(Theme.DARK)
     rescale(style, scale)
     folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto"
     fonts = imgui.get_io().fonts
@@ -64,6 +85,16 @@ def rescale(style: imgui.Style, scale: float) -> None:
     style.scale_all_sizes(scale)
     style.font_size_base = FONT_SIZE
     style.font_scale_dpi = scale
+
+
+def change(theme: Theme) -> None:
+    """Go to another theme."""
+    use(theme)
+    if theme is Theme.LIGHT:
+        imgui.style_colors_light()
+    else:
+        imgui.style_colors_dark()
+    _colours(imgui.get_style())
 
 
 def change_scale(scale: float) -> None:
