@@ -1,0 +1,47 @@
+"""The part of the view state that belongs to looking at a light field: what is undone and redone, and kept for each file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from app.geometry import ZOOM_LIMITS
+from app.plain_json import Json, field_types, from_json, to_json
+from app.state import GAIN_LIMITS, TAIL_LIMITS, ViewState
+
+Snapshot = Mapping[str, Json]
+
+# Fields of ViewState that a snapshot holds.
+LOOKED_AT = ("u", "v", "look", "captured", "display_tone", "zoom", "gain", "tail")
+
+
+def take(state: ViewState) -> Snapshot:
+    """The fields as JSON."""
+    return {name: to_json(getattr(state, name)) for name in LOOKED_AT}
+
+
+def put_back(state: ViewState, snapshot: Snapshot) -> None:
+    """Give the state these fields, within their limits; what is missing or is not what it should be stays as it is."""
+    expected = field_types(ViewState)
+    for name in LOOKED_AT:
+        if name in snapshot:
+            try:
+                setattr(state, name, from_json(expected[name], snapshot[name]))
+            except (TypeError, ValueError):
+                continue
+    _hold_within_limits(state)
+
+
+def _hold_within_limits(state: ViewState) -> None:
+    """What a file says may have been written by any hand."""
+    state.move_to(state.u, state.v)
+    zoom = state.zoom
+    scale = None if zoom.scale is None else _between(zoom.scale, ZOOM_LIMITS)
+    centre = (_between(zoom.centre[0], (0.0, 1.0)), _between(zoom.centre[1], (0.0, 1.0)))
+    state.zoom = replace(zoom, scale=scale, centre=centre)
+    state.gain = _between(state.gain, GAIN_LIMITS)
+    state.tail = _between(state.tail, TAIL_LIMITS)
+
+
+def _between(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])
