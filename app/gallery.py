@@ -9,11 +9,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
+from typing import TYPE_CHECKING
 
 from app.worker import Cancel, LatestWorker
 from lfcore.errors import Cancelled, LfviewError, OutputError
-from lfcore.formats.glance import Glance, glance
-from lfcore.thumbnails import ThumbnailStore, key_of
+
+if TYPE_CHECKING:  # the readers of files are loaded in the thread, when the first glance is wanted
+    from lfcore.formats.glance import Glance
+    from lfcore.thumbnails import ThumbnailStore
 
 HELD = 400  # glances in memory; at most 110 kB each, 60 kB as a rule
 NICENESS = 10  # whatever the hand waits for comes first
@@ -94,6 +97,9 @@ class Gallery:
         return job
 
     def _look(self, path: Path, cancelled: Cancel) -> Seen:
+        from lfcore.formats.glance import glance
+        from lfcore.thumbnails import key_of
+
         try:
             key = key_of(path)
             kept = self._store.get(key) if self._store is not None else None

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from app.canvas import atlas as module
-from app.canvas.atlas import Atlas, Placed
+from app.canvas.atlas import PLACE, Atlas
+from app.desk import Placed
 from lfcore.formats.glance import LONGEST_SIDE
 
 
@@ -20,7 +21,7 @@ def picture(seed: int, height: int = 7, width: int = 5) -> np.ndarray:
 
 def read(gl: Any, placed: Placed) -> np.ndarray:
     """The pixels at that place, straight from the texture."""
-    side = LONGEST_SIDE * module._ACROSS
+    side = PLACE * module._ACROSS
     held = gl.external_texture(placed.texture, (side, side), 3, 0, "f1")
     whole = np.frombuffer(held.read(alignment=1), np.uint8).reshape(side, side, 3)
     x, y = round(placed.first[0] * side - 0.5), round(placed.first[1] * side - 0.5)
@@ -53,6 +54,10 @@ def test_pictures_lie_where_it_is_said_and_those_shown_longest_ago_make_room(gl:
     assert (read(gl, fifth) == new).all()
     assert places[0] is not None
     assert (read(gl, places[0]) == pictures[0]).all()
+
+
+def test_every_glance_has_room() -> None:
+    assert PLACE >= LONGEST_SIDE
 
 
 def test_only_so_many_are_taken_in_a_frame(atlas: Atlas) -> None:

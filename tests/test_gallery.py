@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from test_formats import plain, random_views, save_views
 
-from app import gallery as module
 from app.gallery import HELD, Gallery
 from lfcore.errors import Cancelled, InputError
 from lfcore.formats.glance import Glance
@@ -57,8 +56,8 @@ def looked_at(monkeypatch: pytest.MonkeyPatch) -> list[str]:
             time.sleep(0.002)
         return Glance(PICTURE, path.name)
 
-    monkeypatch.setattr(module, "glance", fake)
-    monkeypatch.setattr(module, "key_of", str)
+    monkeypatch.setattr("lfcore.formats.glance.glance", fake)
+    monkeypatch.setattr("lfcore.thumbnails.key_of", str)
     return names
 
 

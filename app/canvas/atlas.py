@@ -4,28 +4,16 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from app.geometry import Point
-from lfcore.formats.glance import LONGEST_SIDE
+from app.desk import Placed
 
+PLACE = 192  # px a side: room for the largest glance (lfcore.formats.glance)
 _ACROSS = 16  # 256 pictures, 28 MB
 _UPLOADS = 12  # a frame: each takes a tenth of a millisecond
-
-
-@dataclass(frozen=True)
-class Placed:
-    """Where a picture lies: the texture's number, the two corners in it (0 to 1), and the picture's own size in pixels."""
-
-    texture: int
-    first: Point
-    last: Point
-    width: int
-    height: int
 
 
 class Atlas:
@@ -53,7 +41,7 @@ class Atlas:
         texture = self._texture if self._texture is not None else self._make()
         index = self._free_place()
         row, column = divmod(index, self._across)
-        x, y = column * LONGEST_SIDE, row * LONGEST_SIDE
+        x, y = column * PLACE, row * PLACE
         height, width = picture.shape[:2]
         texture.write(np.ascontiguousarray(picture), viewport=(x, y, width, height))
         # Half a pixel inside, so that nothing of the neighbours is mixed in.
@@ -77,8 +65,8 @@ class Atlas:
 
     def _make(self) -> moderngl.Texture:
         largest = int(self._context.info["GL_MAX_TEXTURE_SIZE"])
-        self._across = min(_ACROSS, largest // LONGEST_SIDE)
-        side = self._across * LONGEST_SIDE
+        self._across = min(_ACROSS, largest // PLACE)
+        side = self._across * PLACE
         self._texture = self._context.texture((side, side), 3, alignment=1)
         self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         return self._texture

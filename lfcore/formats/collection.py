@@ -6,6 +6,7 @@ import contextlib
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from lfcore.errors import InputError
@@ -15,6 +16,33 @@ from lfcore.formats.names import belongs_to_grid
 
 MEMBERS_LIMIT = 5000
 CONTAINERS = (".lfp", ".lfr", ".lfx")
+_LEVELS = 3
+
+
+@dataclass(frozen=True)
+class Collection:
+    """A folder, and what in it may be a light field (see `members`)."""
+
+    folder: Path
+    members: tuple[Path, ...]
+
+
+def collection_at(path: Path) -> Collection | None:
+    """The folder at this path as a collection; None where there is nothing to choose from. Raises InputError as `members`."""
+    inside = members(path)
+    return Collection(path, inside) if inside else None
+
+
+def collection_around(path: Path) -> Collection:
+    """The nearest folder above this light field in which there are several to choose from.
+
+    Raises InputError where there is none, or it cannot be read.
+    """
+    for folder in path.absolute().parents[:_LEVELS]:
+        found = collection_at(folder)
+        if found is not None:
+            return found
+    raise InputError(f"There are no other light fields in the folders around {path}; open another folder.")
 
 
 def members(folder: Path) -> tuple[Path, ...]:
