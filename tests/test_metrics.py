@@ -10,7 +10,18 @@ import pytest
 
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
-from lfcore.metrics import absolute_error, k16, k16_view, psnr, squared_error, ssim, to_uint8
+from lfcore.metrics import (
+    PSNR_BLOCK,
+    absolute_error,
+    block_psnr,
+    k16,
+    k16_view,
+    psnr,
+    similarity_map,
+    squared_error,
+    ssim,
+    to_uint8,
+)
 
 
 def pictures(seed: int, shape: tuple[int, ...]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
@@ -132,3 +143,33 @@ def test_error_maps() -> None:
     assert squared_error(a, b)[1, 2] == pytest.approx((0.09 + 0.36) / 3)
     assert absolute_error(a, b).sum() == pytest.approx(0.3)
     assert psnr(a, b) == pytest.approx(10 * math.log10(1 / float(squared_error(a, b).mean())))
+
+
+def test_the_map_of_ssim_has_the_score_as_its_mean_and_is_low_where_the_pictures_differ() -> None:
+    a, _ = pictures(3, (150, 90, 3))  # more rows than one block of the filter
+    b = a.copy()
+    b[100:120, 30:50] = a[100:120, 30:50][::-1]
+    found = similarity_map(a, b)
+    assert found.shape == (150, 90)
+    assert float(found.mean(dtype=np.float64)) == pytest.approx(ssim(a, b), abs=1e-6)
+    assert found[110, 40] < 0.9
+    np.testing.assert_allclose(found[:90], 1, atol=1e-6)  # farther off than the window reaches
+
+
+def test_ssim_of_a_picture_larger_than_a_block_of_the_filter_is_that_of_loops() -> None:
+    """Loops over all of it would take minutes: a single pixel beside the border of two blocks tells."""
+    a, b = pictures(4, (80, 20, 3))
+    found = similarity_map(a, b)
+    cut = slice(64 - 12, 64 + 12)  # around row 64, where the second block begins; the window reaches 5 px
+    np.testing.assert_allclose(found[64 - 6 : 64 + 6], similarity_map(a[cut], b[cut])[6:18], atol=1e-6)
+
+
+def test_psnr_of_blocks_is_psnr_of_each() -> None:
+    a, b = pictures(5, (40, 37, 3))
+    b[:PSNR_BLOCK, :PSNR_BLOCK] = a[:PSNR_BLOCK, :PSNR_BLOCK]
+    found = block_psnr(a, b)
+    assert found.shape == (3, 3)  # 16, 16, 8 rows; 16, 16, 5 columns
+    assert found[0, 0] == math.inf
+    for row, column in ((0, 1), (1, 0), (2, 1), (2, 2)):
+        block = (slice(16 * row, 16 * row + 16), slice(16 * column, 16 * column + 16))
+        assert found[row, column] == pytest.approx(psnr(a[block], b[block]), abs=1e-4)
