@@ -50,6 +50,9 @@ _EXAMPLES = """examples:
 `lfview VERB --help` tells more."""
 
 
+_WITH_PAIRS = ("--uv", "--from", "--to", "--focus")
+
+
 class _Parser(argparse.ArgumentParser):
     """An argument parser whose complaint is one sentence."""
 
@@ -122,11 +125,11 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _normalised(given: list[str]) -> list[str]:
-    """The arguments with --debug first, `view` put in where there is no verb, and the value of --uv tied to it."""
+    """The arguments with --debug first, `view` put in where there is no verb, and values of pairs tied to their options."""
     arguments: list[str] = []
     for argument in given:
-        if arguments and arguments[-1] == "--uv":
-            arguments[-1] = f"--uv={argument}"  # argparse would take "-0.1,0.5" for an option
+        if arguments and arguments[-1] in _WITH_PAIRS:
+            arguments[-1] += f"={argument}"  # argparse would take "-0.1,0.5" for an option
         elif argument != "--debug":
             arguments.append(argument)
     debug = ["--debug"] if "--debug" in given else []

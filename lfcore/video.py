@@ -38,19 +38,21 @@ class _Kind:
     pixels: str
     options: dict[str, str]
     container_options: dict[str, str] = field(default_factory=dict)
+    counts_plays: bool = False  # the file says how often it is to be played
 
 
 _KINDS = {
     ".mp4": _Kind("mp4", "libx264", "yuv420p", {"crf": "18", "preset": "medium"}, {"movflags": "+faststart"}),
     ".webm": _Kind("webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0", "cpu-used": "4", "row-mt": "1"}),
     # WebP is given RGB, since its own conversion to YUV is the one that its readers undo.
-    ".webp": _Kind("webp", "libwebp_anim", "bgra", {"quality": "85", "loop": "0"}, {"loop": "0"}),
-    ".gif": _Kind("gif", "gif", "pal8", {}, {"loop": "0"}),
+    ".webp": _Kind("webp", "libwebp_anim", "bgra", {"quality": "85"}, counts_plays=True),
+    ".gif": _Kind("gif", "gif", "pal8", {}, counts_plays=True),
 }
 
 _TICK = Fraction(1, 100)  # the clock of the palette filters; only the order of frames matters there
 
 VIDEO_EXTENSIONS = tuple(_KINDS)
+COUNTING_EXTENSIONS = tuple(extension for extension, kind in _KINDS.items() if kind.counts_plays)
 
 
 def check_video_target(path: str | os.PathLike[str], fps: float) -> Path:
@@ -62,11 +64,12 @@ def check_video_target(path: str | os.PathLike[str], fps: float) -> Path:
     return target
 
 
-def write_video(path: str | os.PathLike[str], frames: Iterable[ByteArray], fps: float) -> None:
+def write_video(path: str | os.PathLike[str], frames: Iterable[ByteArray], fps: float, plays: int = 0) -> None:
     """Encode the frames, uint8 (H, W, 3) RGB of one size, as they come; only one is held in memory at a time.
 
     The file appears when the last frame is in it; an error or Ctrl-C on the way leaves none. MP4 and WebM are
-    converted to BT.709 with limited range and tagged so; there, odd sizes are padded by the last row or column.
+    converted to BT.709 with limited range and tagged so; there, odd sizes are padded by the last row or column. WebP and
+    GIF are played `plays` times, 0: for ever; the others leave that to the player.
 
     Raises OutputError where the file cannot be written, InputError for a bad rate or no frames; what the iterable
     raises passes through.
@@ -80,7 +83,7 @@ def write_video(path: str | os.PathLike[str], frames: Iterable[ByteArray], fps: 
     rate = Fraction(fps).limit_denominator(1001)
     with atomic_path(target) as temporary, _as_output_error(target):
         prepare = _converter(kind, first)
-        with av.open(str(temporary), "w", format=kind.container, options=kind.container_options) as container:
+        with av.open(str(temporary), "w", format=kind.container, options=_container_options(kind, plays)) as container:
             stream = _add_stream(container, kind, prepare(first), rate)
             for number, frame in enumerate(_chain(first, iterator)):
                 if frame.shape != first.shape or frame.dtype != np.uint8:
@@ -89,6 +92,14 @@ def write_video(path: str | os.PathLike[str], frames: Iterable[ByteArray], fps: 
                 picture.pts, picture.time_base = number, 1 / rate
                 container.mux(stream.encode(picture))
             container.mux(stream.encode(None))
+
+
+def _container_options(kind: _Kind, plays: int) -> dict[str, str]:
+    if not kind.counts_plays:
+        return kind.container_options
+    # A WebP counts how often it is played; a GIF how often it is repeated, and without a count (-1) it is played once.
+    loop = plays if kind.container == "webp" or plays == 0 else plays - 1 or -1
+    return {**kind.container_options, "loop": str(loop)}
 
 
 def _converter(kind: _Kind, first: ByteArray) -> Callable[[ByteArray], av.VideoFrame]:

@@ -5,14 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 
-import numpy as np
 import pytest
 
-from lfcore.cache import SynthesisCache
 from lfcore.errors import InputError
-from lfcore.lightfield import LightField
-from lfcore.sweep import PATHS, circle, horizontal, lawnmower, rendered, spiral, vertical
-from lfcore.synthesizer import Synthesis
+from lfcore.sweep import OPEN_PATHS, PATHS, circle, horizontal, lawnmower, spiral, vertical
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -70,37 +66,8 @@ def test_impossible_paths_are_refused(name: str, frames: int, radius: float) -> 
         PATHS[name](frames, radius)
 
 
-class Counting:
-    """A synthesizer whose picture is u everywhere, and which remembers what it was asked for."""
-
-    name = key = "counting"
-
-    def __init__(self) -> None:
-        self.asked: list[tuple[float, float]] = []
-
-    def set_light_field(self, light_field: LightField) -> None:
-        self.light_field = light_field
-
-    def synthesize(self, u: float, v: float, cancelled: object = None) -> Synthesis:
-        self.asked.append((u, v))
-        return Synthesis(u, v, self.name, np.full((4, 6, 3), u, np.float32), None, None, {"total": 0.0})
-
-
-def test_frames_are_made_one_by_one_and_revisits_come_from_the_cache() -> None:
-    light_field = LightField(np.zeros((2, 2, 4, 6, 3), np.uint8), "test", "", "test")
-    synthesizer = Counting()
-    path = horizontal(8)
-    frames = rendered(path, light_field, synthesizer, SynthesisCache())
-    first = next(frames)
-    assert len(synthesizer.asked) == 1
-    rest = list(frames)
-    assert synthesizer.asked == path[:5]  # the way back meets the frames of the way there
-    assert [int(frame[0, 0, 0]) for frame in [first, *rest]] == [0, 64, 128, 191, 255, 191, 128, 64]
-    assert first.shape == (4, 6, 3)
-
-
-def test_without_room_in_the_cache_frames_are_made_again() -> None:
-    light_field = LightField(np.zeros((2, 2, 4, 6, 3), np.uint8), "test", "", "test")
-    synthesizer = Counting()
-    assert len(list(rendered(horizontal(8), light_field, synthesizer, SynthesisCache(0)))) == 8
-    assert len(synthesizer.asked) == 8
+@pytest.mark.parametrize("name", PATHS)
+def test_closed_paths_lead_back_to_their_beginning_and_open_ones_do_not(name: str) -> None:
+    points = PATHS[name](400)
+    longest = max(math.dist(a, b) for a, b in itertools.pairwise(points))
+    assert (math.dist(points[-1], points[0]) <= longest + 1e-9) == (name not in OPEN_PATHS)
