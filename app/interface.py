@@ -179,7 +179,7 @@ class Interface:
             controller.viewpoint,
             share=controller.share,
             captured=controller.step is Step.CAPTURED,
-            display_tone=state.display_tone,
+            tone=state.looking.tone,
             gain=state.gain,
             disparity_range=controller.disparity_range or (0.0, 1.0),
             dim=dim,

@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
+from app.desk import Desk
 from app.geometry import Point, Zoom
+from app.looking import Looking
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 
 GAIN_LIMITS = (1.0, 64.0)
@@ -129,7 +131,7 @@ class ViewState:
     dragging: bool = False
     look: Look = Look.SYNTHESIS
     captured: bool = False  # show the camera's own view where there is one
-    display_tone: bool = False
+    looking: Looking = field(default_factory=Looking)
     zoom: Zoom = field(default_factory=Zoom)
     gain: float = 8.0  # of the error look
     tail: float = 1.0  # per cent of the disparity values left out at either end of the colour range
@@ -141,6 +143,7 @@ class ViewState:
     path_field: bool = False
     path_text: str = ""
     cursor: Point | None = None  # in picture pixels, None outside
+    desk: Desk = field(default_factory=Desk)  # what lies around the picture
     exhibit: int = 0  # which picture or map of a Lytro file without raw is shown
 
     def move_to(self, u: float, v: float) -> None:

@@ -1,4 +1,6 @@
-// Values become light on screen as they are stored.
+// Values become light on screen as they are stored, exposed.
+uniform float exposure;
+
 vec3 toned(vec3 value) {
-    return value;
+    return value * exposure;
 }

@@ -16,6 +16,7 @@ from app.canvas import BACKGROUND, Canvas, Frame, Target
 from app.engine import _pixels
 from app.geometry import Rect, Zoom, place
 from app.state import CARRIED_FAR, CARRIED_NEAR, Look
+from app.tone import Curve, Tone
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray, as_float
@@ -244,13 +245,13 @@ def test_in_8_bits_the_picture_is_as_near_as_8_bits_can_be(gl: Any) -> None:
     canvas.clear()
 
 
-def test_display_tone_is_the_authors(canvas: Canvas) -> None:
+def test_the_authors_tone_is_theirs(canvas: Canvas) -> None:
     import colorsys
 
     canvas.set_light_field(random_corners("float32"))
     image = np.random.default_rng(5).random((*SIZE, 3)).astype(np.float32)
     give(canvas, image, None, (0.5, 0.5))
-    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), display_tone=True))
+    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), tone=Tone(Curve.AUTHORS)))
     for y, x in ((0, 0), (5, 7), (50, 60), (95, 127)):
         hue, saturation, value = colorsys.rgb_to_hsv(*(float(c) ** (1 / 1.5) for c in image[y, x]))
         expected = colorsys.hsv_to_rgb(hue, min(1.5 * saturation, 1), value)

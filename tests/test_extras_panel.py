@@ -19,6 +19,7 @@ from app.geometry import Zoom, place
 from app.layout import lay_out
 from app.opening import open_by_content
 from app.readout import Caption, Readout
+from app.looking import Looking
 from app.state import Grid
 from app.worker import Cancel
 from lfcore import colormaps
@@ -116,7 +117,7 @@ def test_keys_of_a_light_field_do_nothing_and_the_file_can_be_closed(screen: Scr
         screen.press(key)
     assert (screen.state.u, screen.state.v, screen.state.look, screen.state.exhibit) == before
     assert not screen.state.captured
-    assert not screen.state.display_tone
+    assert screen.state.looking == Looking()
     screen.press("Ctrl+W")
     assert [request.value for request in screen.requests] == ["close"]  # type: ignore[union-attr]
 

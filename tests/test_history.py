@@ -8,9 +8,14 @@ import pytest
 
 from app.geometry import ZOOM_LIMITS, Zoom
 from app.history import LIMIT, RUN_SECONDS, History
+from app.looking import Looking
 from app.snapshot import LOOKED_AT, Snapshot, put_back, take
 from app.state import GAIN_LIMITS, Look, ViewState
+from app.tone import Curve, Tone
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
+
+
+LOOKING = Looking(Tone(Curve.GAMMA, stops=-1.5, gamma=1.8))
 
 
 class Hand:
@@ -132,7 +137,7 @@ def test_undo_and_redo_walk_the_same_way_back_and_forth(hand: Hand) -> None:
 
 
 def test_snapshots_put_everything_back() -> None:
-    state = ViewState(u=0.1, v=-0.2, look=Look.ERROR, captured=True, display_tone=True, zoom=Zoom(3.0), gain=16.0, tail=2.0)
+    state = ViewState(u=0.1, v=-0.2, look=Look.ERROR, captured=True, looking=LOOKING, zoom=Zoom(3.0), gain=16.0, tail=2.0)
     other = ViewState()
     put_back(other, take(state))
     assert take(other) == take(state)

@@ -18,7 +18,7 @@ from app.canvas.compared import Compared
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.inside import Inside
 from app.canvas.magnifier import Magnifier
-from app.canvas.passes import TONES, Passes
+from app.canvas.passes import Passes
 from app.canvas.placing import shown_size
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
@@ -221,7 +221,7 @@ class Canvas:
 
     def _texture_of(self, frame: Frame) -> moderngl.Texture:
         """The picture, or the map, at the light field's own size."""
-        makers, tone = self._at_hand, TONES[frame.display_tone]
+        makers, tone = self._at_hand, frame.tone
         if frame.look is Look.DISPARITY:
             return makers.synthesized.carry_disparity(frame.viewpoint)
         if frame.look is Look.WARPED_ALL:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import moderngl
 
-from app.canvas.passes import TONES, Passes
+from app.canvas.passes import Passes
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import Textures
 from app.geometry import Point
+from app.tone import Tone
 
 
 class Compared:
@@ -26,9 +27,9 @@ class Compared:
             return result.texture
         if textures.newest_at == viewpoint and share >= 1.0:
             # In float32, since the steps of 8 bits would be seen when they are multiplied by the gain.
-            shown = self._synthesized.copied(textures.precise, textures.exact, 0, TONES[False])
+            shown = self._synthesized.copied(textures.precise, textures.exact, 0, Tone())
         else:
-            shown = self._synthesized.picture(viewpoint, share, TONES[False])
+            shown = self._synthesized.picture(viewpoint, share, Tone())
         result.target.use()
         self._passes.get("error.frag").render({"picture": shown.texture, "captured": textures.captured}, {"gain": gain})
         return result.texture

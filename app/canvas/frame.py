@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import moderngl
 
 from app.geometry import Point, Size
 from app.state import Look
+from app.tone import Tone
 
 BACKGROUND = (0.055, 0.058, 0.063)
 
@@ -20,7 +21,7 @@ class Frame:
     viewpoint: Point
     share: float = 1.0  # how far the newest synthesis has been faded in over what was there before
     captured: bool = False  # the camera's own view in place of a synthesis
-    display_tone: bool = False
+    tone: Tone = field(default_factory=Tone)
     gain: float = 1.0
     disparity_range: tuple[float, float] = (0.0, 1.0)
     dim: float = 1.0

@@ -8,6 +8,7 @@ from app.canvas.passes import Passes
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import Textures
 from app.geometry import Point
+from app.tone import Tone
 from lfcore.lightfield import CORNERS
 
 # Corner (index into CORNERS) to its place (column, row) on the sheet of all four.
@@ -22,14 +23,14 @@ class Inside:
         self._textures = textures
         self._synthesized = synthesized
 
-    def warped(self, corner: int, viewpoint: Point, tone: str) -> moderngl.Texture:
+    def warped(self, corner: int, viewpoint: Point, tone: Tone) -> moderngl.Texture:
         """One corner view, warped."""
         result = self._textures.picture
         if result.outdated("warped", viewpoint, corner, tone):
             self._warp_into(result.target, corner, (0, 0), viewpoint, tone)
         return result.texture
 
-    def sheet(self, viewpoint: Point, tone: str) -> moderngl.Texture:
+    def sheet(self, viewpoint: Point, tone: Tone) -> moderngl.Texture:
         """All four on one picture of twice the size."""
         result = self._textures.sheet
         if result.outdated("sheet", viewpoint, tone):
@@ -39,13 +40,13 @@ class Inside:
         return result.texture
 
     def _warp_into(
-        self, target: moderngl.Framebuffer, corner: int, tile: tuple[int, int], viewpoint: Point, tone: str
+        self, target: moderngl.Framebuffer, corner: int, tile: tuple[int, int], viewpoint: Point, tone: Tone
     ) -> None:
         textures = self._textures
         disparity = self._synthesized.carry_disparity(viewpoint)
         target.viewport = (*tile, *textures.size)
         target.use()
-        self._passes.get("warped.frag", tone=tone).render(
+        self._passes.toned("warped.frag", tone).render(
             {"corner_views": textures.corner_views, "disparity": disparity},
             {"viewpoint": viewpoint, "corner": corner, "tile": tile},
         )

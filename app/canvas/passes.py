@@ -7,13 +7,19 @@ from collections.abc import Mapping
 import moderngl
 
 from app import glsl
+from app.tone import Curve, Tone
 from lfcore.errors import LfviewError
 from lfcore.lightfield import CORNERS
 
 AnyTexture = moderngl.Texture | moderngl.TextureArray
 Uniform = float | int | bool | tuple[float, ...] | tuple[tuple[float, float], ...]
 
-TONES = {False: "tone_stored.glsl", True: "tone_bright.glsl"}  # by Frame.display_tone
+_TONES = {
+    Curve.STORED: "tone_stored.glsl",
+    Curve.SRGB: "tone_srgb.glsl",
+    Curve.GAMMA: "tone_gamma.glsl",
+    Curve.AUTHORS: "tone_bright.glsl",
+}
 
 
 class Pass:
@@ -34,9 +40,13 @@ class Pass:
         for unit, (name, texture) in enumerate(textures.items()):
             texture.use(unit)
             self._set(name, unit)
+        self.set(uniforms)
+        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+
+    def set(self, uniforms: Mapping[str, Uniform]) -> None:
+        """Give uniforms values, which they keep."""
         for name, value in uniforms.items():
             self._set(name, value)
-        self._triangle.render(moderngl.TRIANGLES, vertices=3)
 
     def _set(self, name: str, value: Uniform) -> None:
         member = self._program[name]
@@ -52,12 +62,18 @@ class Passes:
         self._compiled: dict[tuple[str, ...], Pass] = {}
 
     def get(self, fragment: str, **included: str) -> Pass:
-        """The fragment shader with these files in place of the includes NAME.glsl; the tone is as stored if not told."""
-        instead = {"tone": TONES[False], **included}
+        """The fragment shader with these files in place of the includes NAME.glsl."""
+        instead = {"tone": _TONES[Curve.STORED], **included}
         key = (fragment, *(f"{name}:{file}" for name, file in sorted(instead.items())))
         if key not in self._compiled:
             self._compiled[key] = Pass(self._context, fragment, {f"{name}.glsl": file for name, file in instead.items()})
         return self._compiled[key]
+
+    def toned(self, fragment: str, tone: Tone, **included: str) -> Pass:
+        """The same for a shader that turns stored values into shown ones, which it will do in this tone."""
+        made = self.get(fragment, tone=_TONES[tone.curve], **included)
+        made.set({"exposure": tone.exposure} | ({"gamma": tone.gamma} if tone.curve is Curve.GAMMA else {}))
+        return made
 
     @property
     def compiled(self) -> frozenset[tuple[str, ...]]:

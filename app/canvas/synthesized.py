@@ -11,17 +11,18 @@ from app.canvas.passes import AnyTexture, Passes, Uniform
 from app.canvas.textures import Picture, Textures
 from app.geometry import Point
 from app.state import carried_share
+from app.tone import Tone
 
 
 class Synthesized:
     """Makes the picture of a viewpoint at the light field's own size. Each part is made anew only if what it shows has
-    changed. `tone`: the shader file that turns stored values into shown ones."""
+    changed."""
 
     def __init__(self, passes: Passes, textures: Textures) -> None:
         self._passes = passes
         self._textures = textures
 
-    def picture(self, viewpoint: Point, share: float, tone: str) -> Picture:
+    def picture(self, viewpoint: Point, share: float, tone: Tone) -> Picture:
         """The best picture of this viewpoint that can be made. share: how far the newest synthesis has been faded in."""
         textures = self._textures
         newest, older = textures.newest_at, textures.older_at if share < 1.0 else None
@@ -45,11 +46,11 @@ class Synthesized:
             return self._mixed(self._corners(viewpoint, False, tone), after, share * near)
         return after if near >= 1.0 else self._mixed(self._corners(viewpoint, True, tone), after, near)
 
-    def copied(self, result: Picture, source: moderngl.TextureArray, layer: int, tone: str) -> Picture:
+    def copied(self, result: Picture, source: moderngl.TextureArray, layer: int, tone: Tone) -> Picture:
         """A layer of these pictures, pixel by pixel."""
         if result.outdated("copy of", source, layer, tone):
             result.target.use()
-            self._passes.get("exact.frag", tone=tone).render({"pictures": source}, {"layer": layer})
+            self._passes.toned("exact.frag", tone).render({"pictures": source}, {"layer": layer})
         return result
 
     def carry_disparity(self, viewpoint: Point) -> moderngl.Texture:
@@ -60,7 +61,7 @@ class Synthesized:
             self._passes.get("carry.frag").render({"disparity_map": textures.disparity_map}, self._carrying(viewpoint))
         return textures.disparity
 
-    def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: str) -> Picture:
+    def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: Tone) -> Picture:
         """The newest synthesis, and where `older` is given also that one, carried to the viewpoint."""
         textures = self._textures
         result = textures.after
@@ -73,10 +74,10 @@ class Synthesized:
             uniforms |= {"older_at": older, "share": share}
         result.target.use()
         sampled: Mapping[str, AnyTexture] = {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}
-        self._passes.get("carried.frag", fade=fade, tone=tone).render(sampled, uniforms)
+        self._passes.toned("carried.frag", tone, fade=fade).render(sampled, uniforms)
         return result
 
-    def _corners(self, viewpoint: Point, warped: bool, tone: str) -> Picture:
+    def _corners(self, viewpoint: Point, warped: bool, tone: Tone) -> Picture:
         """The four corner views, blended as they are or warped by the newest disparity."""
         textures = self._textures
         result = textures.before
@@ -86,9 +87,9 @@ class Synthesized:
         views: dict[str, AnyTexture] = {"corner_views": textures.corner_views}
         if warped:
             sampled = views | {"disparity_map": textures.disparity_map}
-            self._passes.get("instant.frag", tone=tone).render(sampled, self._carrying(viewpoint))
+            self._passes.toned("instant.frag", tone).render(sampled, self._carrying(viewpoint))
         else:
-            self._passes.get("blend.frag", tone=tone).render(views, {"viewpoint": viewpoint})
+            self._passes.toned("blend.frag", tone).render(views, {"viewpoint": viewpoint})
         return result
 
     def _mixed(self, before: Picture, after: Picture, share: float) -> Picture:

@@ -8,6 +8,7 @@ from app import theme
 from app.commands import Context
 from app.readout import Readout
 from app.state import GAIN_LIMITS, TAIL_LIMITS, Look
+from app.tone import Curve
 from app.widgets import DASH, choice, em, heading, milliseconds, pairs, row, slider, switch, tile
 
 _TILES = (
@@ -46,7 +47,7 @@ def _looks(context: Context, fonts: theme.Fonts) -> None:
     imgui.pop_style_var()
     imgui.dummy(ImVec2(0, em() * 0.1))
     switch("Captured view", "captured", state.captured, context)
-    switch("Brighten", "tone", state.display_tone, context)
+    switch("Brighten", "tone", state.looking.tone.curve is Curve.AUTHORS, context)
     _contrast(context)
 
 
