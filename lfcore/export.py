@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 import tempfile
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,23 @@ def write_warped(folder: str | os.PathLike[str], warped: FloatArray, extension: 
     return paths
 
 
+def write_rows(path: str | os.PathLike[str], size: tuple[int, int], bands: Iterable[npt.NDArray[np.uint8]]) -> None:
+    """Write an 8-bit picture of (height, width) as PNG, lightly compressed, from bands of rows (h, W, 3) as they come.
+
+    Raises OutputError where the target cannot be written; what the iterable raises passes through and leaves no file.
+    """
+    target = check_target(path, (".png",))
+    spec = oiio.ImageSpec(size[1], size[0], 3, "uint8")
+    spec.attribute("png:compressionLevel", 2)
+    with _opened(target, spec) as output:
+        row = 0
+        for band in bands:
+            end = row + len(band)
+            if not output.write_scanlines(row, end, 0, np.ascontiguousarray(band)):
+                raise _cannot_write(target, output)
+            row = end
+
+
 def _write(target: Path, values: npt.NDArray[np.generic], stored: str, attributes: Mapping[str, str | int]) -> None:
     height, width, channels = values.shape
     spec = oiio.ImageSpec(width, height, channels, stored)
@@ -119,14 +137,28 @@ def _write(target: Path, values: npt.NDArray[np.generic], stored: str, attribute
         spec.attribute(name, value)
     if target.suffix.lower() in (".tif", ".tiff"):
         spec.attribute("compression", "zip")
+    with _opened(target, spec) as output:
+        if not output.write_image(np.ascontiguousarray(values)):
+            raise _cannot_write(target, output)
+
+
+@contextlib.contextmanager
+def _opened(target: Path, spec: oiio.ImageSpec) -> Iterator[oiio.ImageOutput]:
+    """A writer of the target, which appears when the block has succeeded. Raises OutputError."""
     with atomic_path(target) as temporary:
         output = oiio.ImageOutput.create(str(temporary))
         if output is None:
             raise OutputError(f"Cannot write {target}: {oiio.geterror()}; choose another kind of file.")
         try:
-            done = output.open(str(temporary), spec) and output.write_image(np.ascontiguousarray(values))
+            if not output.open(str(temporary), spec):
+                raise _cannot_write(target, output)
+            yield output
         finally:
             closed = output.close()
-        if not (done and closed):
-            reason = output.geterror() or "the disk may be full"
-            raise OutputError(f"Cannot write {target}: {reason}; choose another place or make room there.")
+        if not closed:
+            raise _cannot_write(target, output)
+
+
+def _cannot_write(target: Path, output: oiio.ImageOutput) -> OutputError:
+    reason = output.geterror() or "the disk may be full"
+    return OutputError(f"Cannot write {target}: {reason}; choose another place or make room there.")
