@@ -10,7 +10,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app import panels, theme
-from app.canvas import Canvas, Frame, Target
+from app.canvas import Canvas, Colours, Frame, Target
+from app.canvas.atlas import Atlas
 from app.commands import Action, OpenPath, Request
 from app.controller import Controller
 from app.engine import Answer
@@ -151,8 +152,10 @@ class Interface:
 
     def _draw_exhibit(self, exhibit: Exhibit, target: Target, layout: Layout, pixels: float) -> None:
         caption, area = exhibit.caption, layout.picture
-        placement = place(self.controller.state.zoom, (caption.width, caption.height), area)
-        self._canvas.draw_exhibit(target, _scaled(area, pixels), _magnified(placement, pixels), caption.span)
+        state = self.controller.state
+        placement = place(state.zoom, (caption.width, caption.height), area)
+        colours = Colours(state.looking.colour_map, caption.span) if caption.span is not None else None
+        self._canvas.draw_exhibit(target, _scaled(area, pixels), _magnified(placement, pixels), colours)
 
     def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
         """`pixels`: framebuffer pixels per window unit."""
@@ -204,3 +207,5 @@ def path_from_text(text: str) -> Path:
     if text.startswith("file://"):
         text = unquote(urlparse(text).path)
     return Path(text).expanduser()
+            colour_map=state.looking.colour_map,
+            level=state.looking.level,

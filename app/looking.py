@@ -5,19 +5,62 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from app.tone import Curve, Tone
+from lfcore.colormaps import ColourMap
+
+# Of the plane sweep, px over the baseline: those of the paper's disparity network.
+LEVEL_LIMITS = (-21.0, 21.0)
+LEVEL_STEP = (LEVEL_LIMITS[1] - LEVEL_LIMITS[0]) / 99
+
+# Red, green and blue (1 = full) by which the inputs, in the order of CORNERS, are told apart,
+# by colour-blind eyes too (Okabe and Ito 2008).
+CORNER_COLOURS = ((0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45), (0.80, 0.47, 0.65))
+
+RANGE_LIMITS = (-99.0, 99.0)  # disparities, px over the baseline
+LEAST_RANGE = 0.1
 
 
 @dataclass(frozen=True)
 class Looking:
-    """What belongs to looking, beyond the look itself."""
+    """What belongs to looking, beyond the look itself. `hand_range`: disparities (px over the baseline) of the first and the
+    last colour, None: by percentiles. `level`: the disparity at which the plane sweep is shown, px over the baseline."""
 
     tone: Tone = field(default_factory=Tone)
+    colour_map: ColourMap = ColourMap.VIRIDIS
+    hand_range: tuple[float, float] | None = None
+    level: float = 0.0
 
     def bounded(self) -> Looking:
         """With everything held within its limits."""
-        return replace(self, tone=self.tone.bounded())
+        chosen = self.with_range(*self.hand_range) if self.hand_range is not None else self
+        return replace(chosen, tone=self.tone.bounded(), level=_between(self.level, LEVEL_LIMITS))
+
+    def with_range(self, low: float, high: float) -> Looking:
+        """With colours from and to these disparities, LEAST_RANGE apart at the least."""
+        low, high = _between(min(low, high), RANGE_LIMITS), _between(max(low, high), RANGE_LIMITS)
+        middle, half = (low + high) / 2, max(high - low, LEAST_RANGE) / 2
+        return replace(self, hand_range=(middle - half, middle + half))
+
+    def with_range_scaled(self, factor: float) -> Looking:
+        """With a range by hand that is so many times as wide, about its middle."""
+        assert self.hand_range is not None
+        low, high = self.hand_range
+        middle, half = (low + high) / 2, factor * (high - low) / 2
+        return self.with_range(middle - half, middle + half)
+
+    def at_next_level(self, step: int) -> Looking:
+        """At the level so many steps further; levels are those of the disparity network, or lie between them."""
+        return replace(self, level=_between(self.level + step * LEVEL_STEP, LEVEL_LIMITS))
+
+    def next_colour_map(self) -> Looking:
+        """With the colour map after this one, going round."""
+        maps = list(ColourMap)
+        return replace(self, colour_map=maps[(maps.index(self.colour_map) + 1) % len(maps)])
 
     def brightened_or_not(self) -> Looking:
         """In the authors' tone, or as stored where it was in that."""
         curve = Curve.STORED if self.tone.curve is Curve.AUTHORS else Curve.AUTHORS
         return replace(self, tone=replace(self.tone, curve=curve))
+
+
+def _between(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])

@@ -26,6 +26,10 @@ class Look(Enum):
     WARPED_TOP_RIGHT = "Warped input, top right"
     WARPED_BOTTOM_RIGHT = "Warped input, bottom right"
     ERROR = "Error against the captured view"
+    LEAN = "Which input it is most like"
+    DISAGREEMENT = "Where the warped inputs disagree"
+    SWEEP_MEAN = "Plane sweep, mean"
+    SWEEP_DEVIATION = "Plane sweep, deviation"
 
     @property
     def corner(self) -> int | None:
@@ -35,9 +39,20 @@ class Look(Enum):
     @property
     def needs_disparity(self) -> bool:
         """Whether there is nothing to see before a disparity map has been computed."""
-        return self is Look.DISPARITY or self is Look.WARPED_ALL or self.corner is not None
+        return self in _BY_DISPARITY or self.corner is not None
+
+    @property
+    def is_sweep(self) -> bool:
+        """Whether it is of the plane sweep at a level."""
+        return self is Look.SWEEP_MEAN or self is Look.SWEEP_DEVIATION
+
+    @property
+    def is_deviation(self) -> bool:
+        """Whether it is a map of deviations from 0 up, in colours and with a gain."""
+        return self is Look.DISAGREEMENT or self is Look.SWEEP_DEVIATION
 
 
+_BY_DISPARITY = frozenset((Look.DISPARITY, Look.WARPED_ALL, Look.LEAN, Look.DISAGREEMENT))
 _SINGLE_CORNER = {
     Look.WARPED_TOP_LEFT: 0,
     Look.WARPED_BOTTOM_LEFT: 1,
@@ -167,8 +182,10 @@ class ViewState:
             self.u, self.v = hand
 
     def change_contrast(self, factor: float) -> None:
-        """More (factor > 1) or less contrast of the error or the disparity, whichever is looked at."""
-        if self.look is Look.ERROR:
+        """More (factor > 1) or less contrast of what is looked at, where it has any."""
+        if self.look is Look.ERROR or self.look.is_deviation:
             self.gain = min(max(self.gain * factor, GAIN_LIMITS[0]), GAIN_LIMITS[1])
+        elif self.look is Look.DISPARITY and self.looking.hand_range is not None:
+            self.looking = self.looking.with_range_scaled(1 / factor)
         elif self.look is Look.DISPARITY:
             self.tail = min(max(self.tail + (1.0 if factor > 1 else -1.0), TAIL_LIMITS[0]), TAIL_LIMITS[1])

@@ -1,6 +1,8 @@
-"""Colour maps for maps of one value: disparity and error, lightness rising evenly with the value."""
+"""Colour maps for maps of one value; but for Turbo, lightness rises evenly with the value."""
 
 from __future__ import annotations
+
+from enum import Enum
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,9 @@ _DISPARITY_STOPS = (
     (0.74, -0.12, 0.11),
     (0.92, 0.01, 0.17),
 )
+_MAGMA_STOPS = ((0.05, 0.0, 0.0), (0.28, 0.07, -0.11), (0.51, 0.16, -0.02), (0.74, 0.12, 0.09), (0.97, -0.01, 0.06))
+_CIVIDIS_STOPS = ((0.24, -0.02, -0.09), (0.41, -0.01, -0.05), (0.58, 0.0, 0.01), (0.75, -0.01, 0.08), (0.92, -0.01, 0.16))
+_GREY_STOPS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 _ERROR_STOPS = ((0.0, 0.0, 0.0), (0.30, 0.12, -0.06), (0.55, 0.19, 0.10), (0.78, 0.07, 0.15), (1.0, 0.0, 0.0))
 
 _OKLAB_TO_LMS = np.array(
@@ -32,6 +37,33 @@ _LMS_TO_RGB = np.array(
         [-0.0041960863, -0.7034186147, 1.7076147010],
     ]
 )
+
+
+# Red, green and blue of Turbo by ascending powers of the value (the approximation published with it: Mikhailov 2019).
+_TURBO = (
+    (0.13572138, 4.61539260, -42.66032258, 132.13108234, -152.94239396, 59.28637943),
+    (0.09140261, 2.19418839, 4.84296658, -14.18503333, 4.27729857, 2.82956604),
+    (0.10667330, 12.64194608, -60.58204836, 110.36276771, -89.90310912, 27.34824973),
+)
+
+
+class ColourMap(Enum):
+    """The colour maps to choose from; the value is the name on screen."""
+
+    VIRIDIS = "Violet to yellow"
+    MAGMA = "Black, red, cream"
+    CIVIDIS = "Blue to yellow"
+    TURBO = "Turbo"
+    GREY = "Grey"
+
+
+def colours(chosen: ColourMap) -> npt.NDArray[np.uint8]:
+    """The colours of a map from low to high: uint8 (256, 3), sRGB."""
+    if chosen is ColourMap.TURBO:
+        places = np.linspace(0, 1, 256)
+        channels = [np.polynomial.polynomial.polyval(places, powers) for powers in _TURBO]
+        return np.rint(255 * np.clip(np.stack(channels, axis=1), 0, 1)).astype(np.uint8)
+    return _table(_STOPS[chosen])
 
 
 def disparity_colours() -> npt.NDArray[np.uint8]:
@@ -52,6 +84,14 @@ def apply(table: npt.NDArray[np.uint8], values: FloatArray, low: float, high: fl
     picture = table[np.rint(np.clip(scaled, 0, 1) * (len(table) - 1)).astype(np.intp)]
     picture[np.isnan(values)] = 128
     return picture
+
+
+_STOPS = {
+    ColourMap.VIRIDIS: _DISPARITY_STOPS,
+    ColourMap.MAGMA: _MAGMA_STOPS,
+    ColourMap.CIVIDIS: _CIVIDIS_STOPS,
+    ColourMap.GREY: _GREY_STOPS,
+}
 
 
 def _table(stops: tuple[tuple[float, float, float], ...]) -> npt.NDArray[np.uint8]:

@@ -3,5 +3,6 @@
 from app.canvas.canvas import Canvas
 from app.canvas.contexts import standalone_context, windowed_context
 from app.canvas.frame import BACKGROUND, Frame, Target
+from app.canvas.magnifier import Colours
 
-__all__ = ["BACKGROUND", "Canvas", "Frame", "Target", "standalone_context", "windowed_context"]
+__all__ = ["BACKGROUND", "Canvas", "Colours", "Frame", "Target", "standalone_context", "windowed_context"]

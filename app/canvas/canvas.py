@@ -17,7 +17,7 @@ import numpy.typing as npt
 from app.canvas.compared import Compared
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.inside import Inside
-from app.canvas.magnifier import Magnifier
+from app.canvas.magnifier import Colours, Magnifier
 from app.canvas.passes import Passes
 from app.canvas.placing import shown_size
 from app.canvas.synthesized import Synthesized
@@ -187,18 +187,19 @@ class Canvas:
     def draw(self, frame: Frame, target: Target, area: Rect, placement: Placement) -> None:
         """Draw the frame's picture into the target, inside the area (in its pixels, y downwards), at the placement."""
         texture = self._texture_of(frame)
-        if frame.look is Look.DISPARITY:
-            self._magnifier.map(texture, frame.disparity_range, target, area, placement)
+        colours = _colours(frame)
+        if colours is not None:
+            self._magnifier.map(texture, colours, target, area, placement)
         else:
             self._magnifier.image(texture, frame.dim, target, area, placement)
 
-    def draw_exhibit(self, target: Target, area: Rect, placement: Placement, values: tuple[float, float] | None) -> None:
-        """Draw the exhibit into the target as `draw` does; of a map, `values` are those of the first and the last colour."""
+    def draw_exhibit(self, target: Target, area: Rect, placement: Placement, colours: Colours | None) -> None:
+        """Draw the exhibit into the target as `draw` does; a map in these colours."""
         assert self._exhibit is not None
-        if values is None:
+        if colours is None:
             self._magnifier.image(self._exhibit, 1.0, target, area, placement)
         else:
-            self._magnifier.map(self._exhibit, values, target, area, placement)
+            self._magnifier.map(self._exhibit, colours, target, area, placement)
 
     def read(self, frame: Frame) -> FloatArray:
         """What `draw` would show of this frame at one window pixel per picture pixel: float32 (H, W, 3)."""
@@ -240,3 +241,18 @@ class Canvas:
         if self._makers is None:
             raise RuntimeError("the canvas has no light field")
         return self._makers
+        if frame.look is Look.LEAN:
+            return makers.inside.lean(frame.viewpoint, frame.share)
+        if frame.look is Look.DISAGREEMENT:
+            return makers.inside.disagreement(frame.viewpoint)
+        if frame.look is Look.SWEEP_MEAN:
+            return makers.inside.sweep_mean(frame.viewpoint, frame.level, tone)
+        if frame.look is Look.SWEEP_DEVIATION:
+            return makers.inside.sweep_deviation(frame.viewpoint, frame.level)
+
+
+def _colours(frame: Frame) -> Colours | None:
+    """In which colours the frame's map is shown; None where it is a picture."""
+    if frame.look is Look.DISPARITY:
+        return Colours(frame.colour_map, frame.disparity_range)
+    return Colours(frame.colour_map, (0.0, 1 / frame.gain)) if frame.look.is_deviation else None

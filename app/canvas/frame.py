@@ -10,6 +10,7 @@ from app.geometry import Point, Size
 from app.state import Look
 from app.tone import Tone
 
+from lfcore.colormaps import ColourMap
 BACKGROUND = (0.055, 0.058, 0.063)
 
 
@@ -27,6 +28,8 @@ class Frame:
     dim: float = 1.0
 
 
+    colour_map: ColourMap = ColourMap.VIRIDIS
+    level: float = 0.0  # of the plane sweep, px over the baseline
 @dataclass(frozen=True)
 class Target:
     """What is drawn into: a framebuffer and its (width, height). A window's framebuffer does not know its own size."""

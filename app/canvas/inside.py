@@ -1,13 +1,14 @@
-"""What the synthesis is made of: the four warped inputs, singly and on one sheet."""
+"""What the synthesis is made of: the warped inputs, where they disagree, which of them it is most like, the plane sweep."""
 
 from __future__ import annotations
 
 import moderngl
 
-from app.canvas.passes import Passes
+from app.canvas.passes import Pass, Passes
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import Textures
 from app.geometry import Point
+from app.looking import CORNER_COLOURS
 from app.tone import Tone
 from lfcore.lightfield import CORNERS
 
@@ -38,6 +39,50 @@ class Inside:
             for corner, (column, row) in enumerate(_SHEET_PLACES):
                 self._warp_into(result.target, corner, (column * width, row * height), viewpoint, tone)
         return result.texture
+
+    def disagreement(self, viewpoint: Point) -> moderngl.Texture:
+        """Deviation of the four warped inputs, as a map."""
+        textures = self._textures
+        result = textures.deviation
+        if result.outdated("disagreement", viewpoint):
+            disparity = self._synthesized.carry_disparity(viewpoint)
+            result.target.use()
+            self._passes.get("disagreement.frag").render(
+                {"corner_views": textures.corner_views, "disparity": disparity}, {"viewpoint": viewpoint}
+            )
+        return result.texture
+
+    def lean(self, viewpoint: Point, share: float) -> moderngl.Texture:
+        """Which warped input the picture is most like, in the colours CORNER_COLOURS."""
+        textures = self._textures
+        result = textures.inner
+        if result.outdated("lean", viewpoint, share):
+            disparity = self._synthesized.carry_disparity(viewpoint)
+            picture = self._synthesized.picture(viewpoint, share, Tone())
+            result.target.use()
+            self._passes.get("lean_nearest.frag").render(
+                {"corner_views": textures.corner_views, "disparity": disparity, "picture": picture.texture},
+                {"viewpoint": viewpoint, "corner_colours": CORNER_COLOURS},
+            )
+        return result.texture
+
+    def sweep_mean(self, viewpoint: Point, level: float, tone: Tone) -> moderngl.Texture:
+        """The mean of the plane sweep at a level (px over the baseline)."""
+        result = self._textures.inner
+        if result.outdated("sweep mean", viewpoint, level, tone):
+            self._sweep_into(result.target, self._passes.toned("sweep_mean.frag", tone), viewpoint, level)
+        return result.texture
+
+    def sweep_deviation(self, viewpoint: Point, level: float) -> moderngl.Texture:
+        """Its standard deviation, as a map."""
+        result = self._textures.deviation
+        if result.outdated("sweep deviation", viewpoint, level):
+            self._sweep_into(result.target, self._passes.get("sweep_deviation.frag"), viewpoint, level)
+        return result.texture
+
+    def _sweep_into(self, target: moderngl.Framebuffer, sweep: Pass, viewpoint: Point, level: float) -> None:
+        target.use()
+        sweep.render({"corner_views": self._textures.corner_views}, {"viewpoint": viewpoint, "level": level})
 
     def _warp_into(
         self, target: moderngl.Framebuffer, corner: int, tile: tuple[int, int], viewpoint: Point, tone: Tone

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import moderngl
 
 from app.canvas.frame import Target
@@ -9,6 +11,15 @@ from app.canvas.passes import Passes, Uniform
 from app.canvas.placing import sampling, visible
 from app.geometry import Placement, Rect
 from lfcore import colormaps
+from lfcore.colormaps import ColourMap
+
+
+@dataclass(frozen=True)
+class Colours:
+    """A colour map, and the values of its first and its last colour."""
+
+    map: ColourMap
+    values: tuple[float, float]
 
 
 class Magnifier:
@@ -16,9 +27,8 @@ class Magnifier:
 
     def __init__(self, context: moderngl.Context, passes: Passes) -> None:
         self._passes = passes
-        colours = colormaps.disparity_colours()  # (256, 3)
-        self._colours = context.texture((len(colours), 1), 3, colours.tobytes(), alignment=1)
-        self._colours.repeat_x = self._colours.repeat_y = False
+        self._context = context
+        self._colours: dict[ColourMap, moderngl.Texture] = {}  # that have been used
 
     def image(self, texture: moderngl.Texture, dim: float, target: Target, area: Rect, placement: Placement) -> None:
         """A picture, its brightness multiplied by `dim`."""
@@ -27,18 +37,22 @@ class Magnifier:
         show.render({"picture": texture}, {**placed, "dim": dim})
         self._finish(target)
 
-    def map(
-        self, texture: moderngl.Texture, values: tuple[float, float], target: Target, area: Rect, placement: Placement
-    ) -> None:
-        """A map of one value in colours; `values` are those of the first and the last colour."""
+    def map(self, texture: moderngl.Texture, colours: Colours, target: Target, area: Rect, placement: Placement) -> None:
+        """A map of one value in colours."""
         placed = self._place(texture, target, area, placement)
         show = self._passes.get("show_disparity.frag", sampled=sampling(placement.scale))
-        show.render({"disparity": texture, "colours": self._colours}, {**placed, "range": values})
+        show.render({"disparity": texture, "colours": self._table(colours.map)}, {**placed, "range": colours.values})
         self._finish(target)
 
-    def _place(
-        self, texture: moderngl.Texture, target: Target, area: Rect, placement: Placement
-    ) -> dict[str, Uniform]:
+    def _table(self, chosen: ColourMap) -> moderngl.Texture:
+        if chosen not in self._colours:
+            colours = colormaps.colours(chosen)  # (256, 3)
+            table = self._context.texture((len(colours), 1), 3, colours.tobytes(), alignment=1)
+            table.repeat_x = table.repeat_y = False
+            self._colours[chosen] = table
+        return self._colours[chosen]
+
+    def _place(self, texture: moderngl.Texture, target: Target, area: Rect, placement: Placement) -> dict[str, Uniform]:
         framebuffer, (width, height) = target.framebuffer, target.size
         inside = visible(texture.size, area, placement)
         framebuffer.viewport = (0, 0, width, height)

@@ -12,7 +12,7 @@ from lfcore.errors import LfviewError
 from lfcore.lightfield import CORNERS
 
 AnyTexture = moderngl.Texture | moderngl.TextureArray
-Uniform = float | int | bool | tuple[float, ...] | tuple[tuple[float, float], ...]
+Uniform = float | int | bool | tuple[float, ...] | tuple[tuple[float, ...], ...]
 
 _TONES = {
     Curve.STORED: "tone_stored.glsl",

@@ -15,8 +15,8 @@ TEXTURE_TYPES = {"uint8": "f1", "uint16": "nu2", "float32": "f4"}  # numpy type 
 class Picture:
     """A texture that a pass draws into, and what it was last drawn for."""
 
-    def __init__(self, context: moderngl.Context, size: Size, dtype: str, owner: Textures) -> None:
-        self.texture = make_texture(context, size, 4, dtype)
+    def __init__(self, context: moderngl.Context, size: Size, dtype: str, owner: Textures, components: int = 4) -> None:
+        self.texture = make_texture(context, size, components, dtype)
         self.target = context.framebuffer([self.texture])
         self._owner = owner
 
@@ -63,6 +63,8 @@ class Textures:
         self.precise = Picture(context, self.size, "f4", self)
         self.made = 0  # how often a target was made
         self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
+        self.inner = Picture(context, self.size, picture_type, self)
+        self.deviation = Picture(context, self.size, "f4", self, components=1)
 
     def outdated(self, target: object, *made_for: object) -> bool:
         """Whether the target was last made for something else; it counts as made for this from now on."""
