@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from app.asking import FOR_NOW, Asking, NotAnswered, Task, Wish
+from app.desk import Card, Folder
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
-from app.loading import FindPreview, Loading, NotOpened, Open, Opened, Preview
+from app.loading import FindPreview, Loading, NotOpened, Open, Preview
 from app.readout import Readout
 from app.state import CARRIED_NEAR, Grid, Look, Step, ViewState, carried_share
 from lfcore.cache import rounded
@@ -58,7 +59,8 @@ class Controller:
         self._engine = engine
         self._loading = Loading(open_light_field, preview, wake)
         self._asking = Asking(engine, wake)
-        self._previewing = False  # what is on screen stands in for the light field that is being opened
+        self.folder: Folder | None = None  # what there is to choose from in the browser
+        self.previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
         self._models = models or {}
         self._grid: Grid | None = None
@@ -83,7 +85,7 @@ class Controller:
     def cancel_open(self) -> None:
         """Give up the light field that is being opened."""
         self._loading.cancel()
-        if self._previewing:
+        if self.previewing:
             self._take(None)
 
     def close(self) -> None:
@@ -139,7 +141,8 @@ class Controller:
         if self._next is not None and self.share >= 1.0:
             answer, self._next = self._next, None
             self._accept(answer)
-        if not self._previewing:
+        self._compare(self.light_field)
+        if not self.previewing:
             useless = self._resting and self._newest_disparity  # what was asked for elsewhere, to be carried here
             self._asking.ask(self.light_field, self._wanted(self.light_field), useless)
 
@@ -271,12 +274,12 @@ class Controller:
     def _newest_disparity(self) -> bool:
         return self.newest is not None and self.newest.synthesis.disparity is not None
 
-    def _take(self, opened: Opened | None) -> None:
+    def _take(self, opened: LightField | Exhibition | None) -> None:
         light_field = opened if isinstance(opened, LightField) else None
         self.light_field = light_field
         self.exhibition = opened if isinstance(opened, Exhibition) else None
         self.state.exhibit = self.exhibition.first if self.exhibition is not None else 0
-        self._previewing = False
+        self.previewing = False
         self.newest = self.picture = self._next = None
         self._asking.forget()
         self._shown = None
@@ -297,9 +300,9 @@ class Controller:
         for loaded in self._loading.news():
             if isinstance(loaded, Preview):
                 self._take(loaded.light_field)
-                self._previewing = True
+                self.previewing = True
             elif isinstance(loaded, NotOpened):
-                if self._previewing:
+                if self.previewing:
                     self._take(None)
                 self.say(loaded.message)
             else:
@@ -337,6 +340,9 @@ class Controller:
     def _follows_seamlessly(self, answer: Answer) -> bool:
         """Whether the answer can take the place of what is on screen without a fade: one quick synthesis after another,
         carried a short way, differ by less than can be seen (docs/speed.md), and a fade would only cost time."""
+            elif isinstance(loaded, Folder):
+                self.folder = loaded
+                self.state.desk.show(Card.BROWSER)
         newest = self.newest
         if newest is None or not newest.step is answer.step is Step.REALTIME:
             return False

@@ -6,13 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from app.geometry import Point
 from app.settings import SCALE_LIMITS, Theme
-
-if TYPE_CHECKING:  # the readers of files are loaded when they are needed
-    from lfcore.formats.collection import Collection
 
 SCALE_STEP = 0.25
 
@@ -78,11 +74,19 @@ def _nothing_yet(path: Path) -> Thumbnail:
 
 
 @dataclass(frozen=True)
+class Folder:
+    """A folder, and what in it may be a light field; the folder is None for files that were dropped together."""
+
+    path: Path | None
+    members: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
 class Shelf:
     """Files to choose from: opened lately, and those of a folder. `thumbnail` tells what is known of one by now; those that
     are asked for in a frame are looked at next. `listing`: a folder is being listed."""
 
     recent: tuple[Path, ...] = ()
-    folder: Collection | None = None
+    folder: Folder | None = None
     listing: bool = False
     thumbnail: Callable[[Path], Thumbnail] = field(default=_nothing_yet)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
@@ -31,13 +32,15 @@ class Seen:
 
     glance: Glance | None
     reason: str = ""
+    number: int = field(default_factory=itertools.count().__next__)  # no other has it
 
 
 class Gallery:
-    """All methods belong to the main thread, and none waits."""
+    """All methods belong to the main thread, and none waits. `open_store`: where glances are kept; None keeps none."""
 
-    def __init__(self, store: ThumbnailStore | None, wake: Callable[[], None]) -> None:
-        self._store = store
+    def __init__(self, open_store: Callable[[], ThumbnailStore] | None, wake: Callable[[], None]) -> None:
+        self._open_store = open_store
+        self._store: ThumbnailStore | None = None  # belongs to the thread, as does what opens it
         self._worker: LatestWorker[None] = LatestWorker("thumbnails", wake, NICENESS)
         self._found: SimpleQueue[tuple[int, Path, Seen]] = SimpleQueue()
         self._seen: OrderedDict[Path, Seen] = OrderedDict()  # the one asked for longest ago first
@@ -102,6 +105,8 @@ class Gallery:
 
         try:
             key = key_of(path)
+            if self._open_store is not None:
+                self._store, self._open_store = self._open_store(), None
             kept = self._store.get(key) if self._store is not None else None
             if kept is not None:
                 return Seen(kept)

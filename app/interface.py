@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
 import moderngl
 import numpy as np
-from imgui_bundle import imgui
+from imgui_bundle import ImVec4, imgui
 
 from app import panels, theme
 from app.canvas import Canvas, Colours, Frame, Target
@@ -15,28 +16,37 @@ from app.canvas.atlas import Atlas
 from app.commands import Action, OpenPath, Request
 from app.controller import Controller
 from app.engine import Answer
+from app.desk import Placed
 from app.exhibits import Exhibit
 from app.geometry import Placement, Rect, place
+from app.gallery import Seen
 from app.layout import Layout
 from app.state import Look, Step
+from app.settings import Theme
 from assets import sample_path
+from app.surroundings import Surroundings
 from lfcore.errors import LfviewError
 from lfcore.lightfield import CORNERS, LightField
 
 GLSL_VERSION = "#version 330 core"
 DIMMED = 0.35
-PANEL = (theme.PANEL.x, theme.PANEL.y, theme.PANEL.z)
 
 
 class Interface:
     """Draws frames into a framebuffer. Belongs to the thread on which the GL context and the imgui context are current."""
 
-    def __init__(self, controller: Controller, context: moderngl.Context, scale: float) -> None:
+    def __init__(
+        self, controller: Controller, context: moderngl.Context, scale: float, surroundings: Surroundings | None = None
+    ) -> None:
         self.controller = controller
         self.closing = False
+        self.surroundings = surroundings or Surroundings(controller, wake=lambda: None)
+        self.surroundings.picture_of = self._picture_of
         self._canvas = Canvas(context)
         self._fonts = theme.apply(scale)
+        self._atlas = Atlas(context)
         self._scale = scale
+        self._theme = Theme.DARK
         self._light_field: LightField | None = None  # what the canvas has taken
         self._answer: Answer | None = None
         self._captured: int | None = None
@@ -47,7 +57,8 @@ class Interface:
         imgui.backends.opengl3_init(GLSL_VERSION)
 
     def set_scale(self, scale: float) -> None:
-        """Go to another content scale of text."""
+        """Go to another content scale of text, unless the person has chosen one."""
+        scale = self.controller.state.desk.scale or scale
         if scale != self._scale:
             self._scale = scale
             theme.change_scale(scale)
@@ -56,22 +67,25 @@ class Interface:
         """Draw one frame. imgui's display size and events must have been set (by its platform backend); `now` in seconds."""
         self.controller.tick(now)
         imgui.backends.opengl3_new_frame()
+        self.surroundings.arrive()
+        self._change_theme()
+        self._atlas.begin()
         imgui.new_frame()
         display = imgui.get_io().display_size
         state = self.controller.state
-        layout, requests = panels.draw(
-            state, self.controller.readout(self._picture_ms), (display.x, display.y), self._scale, self._fonts
-        )
+        readout = replace(self.controller.readout(self._picture_ms), shelf=self.surroundings.shelf())
+        layout, requests = panels.draw(state, readout, (display.x, display.y), self._scale, self._fonts)
         imgui.render()
         # What the panels changed is drawn in this very frame.
         for request in requests:
             self._fulfil(request)
         self.controller.tick(now)
         self._synchronise()
+        self.surroundings.tick(now, imgui.is_any_mouse_down())
         self._synchronise_exhibit()
         pixels = target.size[0] / max(display.x, 1.0)
         grounds = [area for area in (layout.panel, layout.status) if area is not None]
-        self._canvas.begin(target, [(_scaled(area, pixels), PANEL) for area in grounds])
+        self._canvas.begin(target, [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in grounds], _rgb(theme.BACKGROUND))
         if self._light_field is not None:
             self._draw_picture(target, layout, pixels)
         elif self._exhibit is not None:
@@ -89,6 +103,7 @@ class Interface:
         self._canvas.clear()
         self._canvas.clear_exhibit()
         imgui.backends.opengl3_shutdown()
+        self._atlas.release()
 
     def _fulfil(self, request: Request) -> None:
         controller = self.controller
@@ -105,6 +120,20 @@ class Interface:
         elif request is Action.QUIT:
             self.closing = True
 
+        else:
+            self.surroundings.fulfil(request)
+
+    def _change_theme(self) -> None:
+        chosen = self.controller.state.desk.theme
+        if chosen is not self._theme:
+            self._theme = chosen
+            theme.change(chosen)
+
+    def _picture_of(self, seen: Seen) -> Placed | None:
+        """Where the thumbnail of a light field lies for imgui, once it has been handed to the graphics."""
+        if seen.glance is None or seen.glance.picture is None:
+            return None
+        return self._atlas.place(seen.number, seen.glance.picture)
     def _synchronise(self) -> None:
         """Hand to the canvas what it has not yet taken."""
         controller, canvas = self.controller, self._canvas
@@ -186,10 +215,16 @@ class Interface:
             gain=state.gain,
             disparity_range=controller.disparity_range or (0.0, 1.0),
             dim=dim,
+            colour_map=state.looking.colour_map,
+            level=state.looking.level,
         )
 
 
 def _scaled(area: Rect, pixels: float) -> Rect:
+def _rgb(colour: ImVec4) -> tuple[float, float, float]:
+    return colour.x, colour.y, colour.z
+
+
     """From window units to framebuffer pixels."""
     return Rect(area.x * pixels, area.y * pixels, area.width * pixels, area.height * pixels)
 
@@ -207,5 +242,3 @@ def path_from_text(text: str) -> Path:
     if text.startswith("file://"):
         text = unquote(urlparse(text).path)
     return Path(text).expanduser()
-            colour_map=state.looking.colour_map,
-            level=state.looking.level,

@@ -22,6 +22,8 @@ _KEYS: dict[str, tuple[imgui.Key, ...]] = {
     "Enter": (imgui.Key.enter, imgui.Key.keypad_enter),
     "Backspace": (imgui.Key.backspace,),
     "Comma": (imgui.Key.comma,),
+    "Plus": (imgui.Key.equal, imgui.Key.keypad_add),
+    "Minus": (imgui.Key.minus, imgui.Key.keypad_subtract),
     "PgUp": (imgui.Key.page_up,),
     "PgDn": (imgui.Key.page_down,),
     **{f"F{number}": (getattr(imgui.Key, f"f{number}"),) for number in range(1, 13)},
@@ -33,9 +35,10 @@ _REPEATING = frozenset(("Left", "Right", "Up", "Down"))
 
 
 def run_pressed(context: commands.Context) -> None:
-    """Run every command whose key goes down (or repeats) in this frame; while a text is typed, only with Ctrl, Esc, F1."""
+    """Run every command whose key goes down (or repeats) in this frame; while a text is typed or a card
+    takes the keys, only with Ctrl, Esc, F1."""
     io = imgui.get_io()
-    typing = io.want_text_input or context.state.path_field
+    typing = io.want_text_input or context.state.path_field or context.state.desk.card is not None
     typed = "" if typing else "".join(map(chr, io.input_queue_characters))
     held = _Held(_or_just_released(io.key_ctrl, _CTRL), _or_just_released(io.key_shift, _SHIFT))
     for name, command in commands.COMMANDS.items():
@@ -59,7 +62,8 @@ def _pressed(name: str, typed: str, typing: bool, held: _Held) -> bool:
     if name in _CHARACTERS:
         return name in typed and not held.ctrl
     ctrl, shift, cap = "Ctrl+" in name, "Shift+" in name, name.rsplit("+", 1)[-1]
-    if (held.ctrl, held.shift) != (ctrl, shift) or (typing and not held.ctrl and name not in _WHILE_TYPING):
+    shifted = held.shift and cap != "Plus"  # which has its key to itself on some keyboards, and needs Shift on others
+    if (held.ctrl, shifted) != (ctrl, shift) or (typing and not held.ctrl and name not in _WHILE_TYPING):
         return False
     return any(imgui.is_key_pressed(key, name in _REPEATING) for key in _KEYS[cap])
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+from app.desk import Folder
 from app.exhibits import Exhibition
 from app.worker import Cancel, Done, LatestWorker
 from lfcore.errors import Cancelled
@@ -15,7 +16,7 @@ from lfcore.lightfield import LightField
 
 Progress = Callable[[float], None]
 FindPreview = Callable[[Path], LightField | None]
-Opened = LightField | Exhibition
+Opened = LightField | Exhibition | Folder
 Open = Callable[[Path, Progress, Cancel], Opened]
 
 PROGRESS_SECONDS = 0.15

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.desk import Folder
 from app.engine import Engine, ModelChoice
 from app.exhibits import Exhibition, open_exhibition
 from assets import weights_path
@@ -16,22 +17,53 @@ from lfcore.store import ViewStore
 
 if TYPE_CHECKING:
     from lfcore.synthesizer import Synthesizer
+    from lfcore.thumbnails import ThumbnailStore
 
 
-def open_by_content(path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> LightField | Exhibition:
-    """Open any light field that lfcore can read, or what a Lytro file without raw shows.
+def open_by_content(
+    path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]
+) -> LightField | Exhibition | Folder:
+    """Open any light field that lfcore can read, what a Lytro file without raw shows, or a folder of light fields.
 
     Calibration of a Lytro camera is remembered, and an InputError says so.
     """
     from lfcore.decode.calibration_files import holds_calibration
     from lfcore.decode.remembered import remember
     from lfcore.formats import open_light_field
+    from lfcore.formats.collection import members
 
     if holds_calibration(path):
         remember(path)
         raise InputError(f"{path} is calibration of a Lytro camera: it is remembered, and used for its captures from now on.")
+    inside = members(path)
+    if inside:
+        return Folder(path, inside)
     exhibition = open_exhibition(path)
     return exhibition if exhibition is not None else open_light_field(path, progress=progress, cancelled=cancelled)
+
+
+def list_folder(path: Path) -> Folder:
+    """The folder at this path, and what in it may be a light field. Raises InputError where there is nothing."""
+    from lfcore.formats.collection import members
+
+    inside = members(path)
+    if not inside:
+        raise InputError(f"{path} is no folder with light fields to choose from; open another.")
+    return Folder(path, inside)
+
+
+def folder_around(path: Path) -> Path:
+    """The nearest folder above this light field with several to choose from. Raises InputError where there is none."""
+    from lfcore.formats.collection import folder_around as found_around
+
+    return found_around(path)
+
+
+def thumbnail_store() -> ThumbnailStore:
+    """Where this user's thumbnails are kept."""
+    from lfcore.thumbnails import default_store
+
+    return default_store()
 
 
 def preview(path: Path) -> LightField | None:
@@ -45,6 +77,7 @@ def preview(path: Path) -> LightField | None:
         return None  # opening it will say what is wrong
 
 
+DEFAULT_MODEL = "full"
 QUICK = "realtime"
 SHIPPED = ("full", "realtime", "planesweep", "mean")  # lfcore.synthesizer.MODEL_NAMES, without importing torch
 

@@ -32,11 +32,12 @@ def draw(
     context = Context(
         state, readout.grid, size, area, readout.loading is not None, bool(readout.messages), len(readout.captions)
     )
-    context.models, context.model = readout.models, readout.model
+    context.models, context.model, context.scale = readout.models, readout.model, scale
+    context.disparity_range = readout.disparity_range
     keyboard.run_pressed(context)
     state.dragging = state.dragging and imgui.is_mouse_down(0)
     size = picture_size(readout, state)
-    covered = state.path_field or state.help
+    covered = state.path_field or state.help or state.desk.card is not None
     if readout.grid is not None:
         picture.draw(area, state, size, scale)
         overlays.notices(area, state, readout)
@@ -47,11 +48,14 @@ def draw(
         picture.draw_still(area, state, size)
         overlays.legend(area, state, readout)
     elif readout.loading is None and not covered:
-        overlays.start(area, context, fonts)
+        overlays.start(area, context, readout.shelf, fonts)
     if layout.panel is not None:
         panel = extras if readout.captions else sidebar
         panel.draw(layout.panel, context, readout, fonts)
     statusbar.draw(layout.status, state, readout, place(state.zoom, size, area).scale)
+    overlays.browser(area, context, readout.shelf, fonts)
+    overlays.settings(area, context, readout, fonts)
+    overlays.palette(area, context)
     overlays.loading(area, context, readout)
     overlays.path_field(area, context)
     overlays.key_page(area, context, fonts)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from app.desk import Shelf
 from app.geometry import Point
 from app.state import Grid, Step
 
@@ -61,3 +62,4 @@ class Readout:
     cache_bytes: int = 0
     cache_limit: int = 0
     cache_hits: int = 0
+    shelf: Shelf = field(default_factory=Shelf)  # files to choose from

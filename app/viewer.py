@@ -6,6 +6,7 @@ import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 # imgui-bundle brings its own glfw library and tells the glfw package to use that one: it must be imported first, or two
@@ -19,8 +20,12 @@ from app.canvas import Target, windowed_context
 from app.controller import Controller
 from app.engine import Engine, ModelChoice
 from app.frametimes import FrameTimes
+from app.geometry import Rect
 from app.interface import Interface
-from app.opening import make_engine, offered_models, open_by_content, preview
+from app.opening import DEFAULT_MODEL, make_engine, offered_models, open_by_content, preview, thumbnail_store
+from app.settings import SettingsFile, WindowPlace, default_path
+from app.surroundings import Keeping, Surroundings
+from app.window_place import fitted
 from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.kept_files import default_root
@@ -47,27 +52,44 @@ class NoDisplay(LfviewError):
 
 
 def run_viewer(
-    path: Path | None, model: str = "full", cache_mib: int = 512, disk_mib: int = 1024, foresight: bool = True
+    path: Path | None, model: str | None = None, cache_mib: int = 512, disk_mib: int = 1024, foresight: bool = True
 ) -> int:
-    """Open the window on the light field at `path` (None: the sample) and stay until it is closed. Returns the exit code 0.
+    """Open the window on the light field at `path` and stay until it is closed. Returns the exit code 0.
 
-    cache_mib, disk_mib: bounds of the memory and (0: none) the disk for past syntheses. foresight: compute views ahead.
-    Faults of light fields and models are shown in the window. Raises NoDisplay where there is no display or no OpenGL 3.3.
+    path: None shows the start picture with the files opened lately, the sample where there are none. model: None takes that
+    of the last run. cache_mib, disk_mib: bounds of the memory and (0: none) the disk for past syntheses. foresight: compute
+    views ahead. Faults of light fields and models are shown in the window. Raises NoDisplay where there is no display or no
+    OpenGL 3.3.
     """
+    file = SettingsFile(default_path())
+    settings, fault = file.load()
+    keeping = Keeping(settings, fault, file, thumbnail_store if disk_mib > 0 else None)
+    chosen = model or settings.model or DEFAULT_MODEL
     store = ViewStore(default_root(), disk_mib * MEBIBYTE) if disk_mib > 0 else None
-    engine = make_engine(model, cache_mib * MEBIBYTE, store)
-    show(path if path is not None else sample_path(), engine, Path(model).name, foresight, offered_models(model))
+    engine = make_engine(chosen, cache_mib * MEBIBYTE, store)
+    if path is None and not settings.recent:
+        path = sample_path()
+    show(path, engine, Path(chosen).name, foresight, offered_models(chosen), keeping)
     return 0
 
 
 def show(
-    path: Path, engine: Engine, model: str, foresight: bool = True, models: Mapping[str, ModelChoice] | None = None
+    path: Path | None,
+    engine: Engine,
+    model: str,
+    foresight: bool = True,
+    models: Mapping[str, ModelChoice] | None = None,
+    keeping: Keeping | None = None,
 ) -> None:
-    """Open the window on the light field at `path` with this engine, and stay until it is closed. models: to choose from."""
-    with _window(engine, model, models) as (window, controller):
-        controller.state.foresight = foresight
+    """Open the window on the light field at `path` (None: on none) with this engine, and stay until it is closed.
+
+    models: to choose from. keeping: what was kept from the last run, and where things are kept.
+    """
+    with _window(engine, model, models, keeping) as (window, controller):
+        controller.state.foresight = foresight and controller.state.foresight
         window.draw()  # the first frame, before anything slow is imported
-        controller.open(path)
+        if path is not None:
+            controller.open(path)
         window.warm_up()
         window.run()
 
@@ -86,18 +108,21 @@ def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTime
 
 @contextmanager
 def _window(
-    engine: Engine, model: str, models: Mapping[str, ModelChoice] | None = None
+    engine: Engine, model: str, models: Mapping[str, ModelChoice] | None = None, keeping: Keeping | None = None
 ) -> Iterator[tuple[_Window, Controller]]:
     """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
-    window = _Window()
+    window = _Window(keeping.settings.window if keeping is not None else None)
     controller = Controller(
         engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview, models=models
     )
+    surroundings = Surroundings(controller, glfw.post_empty_event, keeping)
     try:
-        window.attach(controller)
+        window.attach(controller, surroundings)
         yield window, controller
     finally:
+        surroundings.window = window.place()
         window.hide()
+        surroundings.stop()
         controller.stop()
         window.close()
 
@@ -110,9 +135,9 @@ class _Loader:
 
 
 class _Window:
-    """A glfw window with the interface in it."""
+    """A glfw window with the interface in it; `place` is where it was the last time."""
 
-    def __init__(self) -> None:
+    def __init__(self, place: WindowPlace | None = None) -> None:
         glfw.ERROR_REPORTING = "ignore"
         if not glfw.init():
             raise NoDisplay(
@@ -124,7 +149,9 @@ class _Window:
         glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
         glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
         glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
-        self._window = glfw.create_window(*WINDOW_SIZE, TITLE, None, None)
+        glfw.window_hint(glfw.VISIBLE, place is None)  # a place is taken before the window is seen
+        size = (place.width, place.height) if place is not None else WINDOW_SIZE
+        self._window = glfw.create_window(*size, TITLE, None, None)
         if not self._window:
             fault = _glfw_fault()
             glfw.terminate()
@@ -133,6 +160,8 @@ class _Window:
                 f"renderer (on Debian: libgl1-mesa-dri)."
             )
         glfw.set_window_size_limits(self._window, *SMALLEST_SIZE, glfw.DONT_CARE, glfw.DONT_CARE)
+        if place is not None:
+            self._go_to(place)
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
         self._context = windowed_context(_Loader())
@@ -142,6 +171,7 @@ class _Window:
         self._touched_at = 0.0  # last event of mouse or keyboard
         self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
         self._title = TITLE
+        self._unmaximised = place or WindowPlace(0, 0, *WINDOW_SIZE)
         imgui.create_context()
         imgui.get_io().set_ini_filename("")
         # Set before imgui sets its own callbacks, which call these.
@@ -152,9 +182,30 @@ class _Window:
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
 
-    def attach(self, controller: Controller) -> None:
+    def attach(self, controller: Controller, surroundings: Surroundings) -> None:
         """Show this controller's light field from now on."""
-        self._interface = Interface(controller, self._context, self._scale())
+        self._interface = Interface(controller, self._context, self._scale(), surroundings)
+
+    def place(self) -> WindowPlace:
+        """Where the window is; of a maximised one where it would go back to."""
+        maximised = bool(glfw.get_window_attrib(self._window, glfw.MAXIMIZED))
+        if not maximised:
+            self._note_place()
+        return replace(self._unmaximised, maximised=maximised)
+
+    def _note_place(self) -> None:
+        x, y = glfw.get_window_pos(self._window)
+        self._unmaximised = WindowPlace(x, y, *glfw.get_window_size(self._window))
+
+    def _go_to(self, place: WindowPlace) -> None:
+        """Take the place of the last time, where some monitor still shows enough of it."""
+        monitors = [Rect(*map(float, glfw.get_monitor_workarea(each))) for each in glfw.get_monitors()]
+        x, y, width, height = fitted(place, monitors)
+        glfw.set_window_size(self._window, width, height)
+        glfw.set_window_pos(self._window, x, y)
+        if place.maximised:
+            glfw.maximize_window(self._window)
+        glfw.show_window(self._window)
 
     def warm_up(self) -> None:
         """See Interface.warm_up."""
@@ -225,9 +276,9 @@ class _Window:
         if more_due:
             return to_next_frame
         waits = [_IDLE_INTERVAL]
-        due_in = self._at_hand.controller.next_frame_in
-        if due_in is not None:
-            waits.append(max(due_in, to_next_frame))
+        for due_in in (self._at_hand.controller.next_frame_in, self._at_hand.surroundings.next_frame_in):
+            if due_in is not None:
+                waits.append(max(due_in, to_next_frame))
         if now - self._touched_at < _HOVER_SECONDS:
             waits.append(_HOVER_INTERVAL)
         if imgui.get_io().want_text_input:
@@ -256,9 +307,11 @@ class _Window:
         self._touched()
 
     def _dropped(self, _: object, paths: Sequence[str]) -> None:
-        """Open the first of the files or folders dropped on the window."""
+        """Open what was dropped on the window; where that are several, show them to choose from."""
         self._touched_at = time.monotonic()
-        if paths:
+        if len(paths) > 1:
+            self._at_hand.surroundings.choose_among([Path(path) for path in paths])
+        elif paths:
             self._at_hand.controller.open(Path(paths[0]))
 
 

@@ -10,15 +10,16 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app import commands, theme
 from app.geometry import Rect
 
-_BARE = (
+# Nothing but its contents.
+BARE = (
     imgui.WindowFlags_.no_decoration.value
     | imgui.WindowFlags_.no_move.value
     | imgui.WindowFlags_.no_saved_settings.value
     | imgui.WindowFlags_.no_nav.value
 )
 # Parts of the window that do not move; app.interface fills their ground, since clearing costs less than drawing.
-FIXED = _BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value | imgui.WindowFlags_.no_background.value
-CARD = _BARE | imgui.WindowFlags_.always_auto_resize.value
+FIXED = BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value | imgui.WindowFlags_.no_background.value
+CARD = BARE | imgui.WindowFlags_.always_auto_resize.value
 PASSIVE = CARD | imgui.WindowFlags_.no_inputs.value  # a card that is only looked at
 DASH = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"

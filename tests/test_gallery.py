@@ -67,7 +67,7 @@ def test_real_folders_are_seen_and_kept_on_disk(tmp_path: Path) -> None:
     store = ThumbnailStore(tmp_path / "thumbnails")
     woken = threading.Event()
     for _ in range(2):  # the second time from the disk
-        gallery = Gallery(store, woken.set)
+        gallery = Gallery(lambda: store, woken.set)
         look_at(gallery, [folder, tmp_path / "absent"])
         seen, absent = gallery.seen(folder), gallery.seen(tmp_path / "absent")
         gallery.stop(PATIENCE)

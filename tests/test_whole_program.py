@@ -133,7 +133,7 @@ def test_a_faulty_path_is_said_and_the_viewer_lives_on(screen: VirtualScreen, fo
         screen.xdotool("mousemove", *BESIDE)
         screen.xdotool("key", "Escape")
         wait_until(lambda: not message_shown(), "the message to go")
-        screen.xdotool("key", "ctrl+o")
+        screen.xdotool("key", "ctrl+shift+o")
         field = screen.pixels()
         wait_until(lambda: bool((screen.pixels() != field).any()), "the path field", 5.0)
         link = tmp_path / "field"

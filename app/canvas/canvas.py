@@ -164,7 +164,12 @@ class Canvas:
 
     # Drawing.
 
-    def begin(self, target: Target, rectangles: Sequence[tuple[Rect, tuple[float, float, float]]] = ()) -> None:
+    def begin(
+        self,
+        target: Target,
+        rectangles: Sequence[tuple[Rect, tuple[float, float, float]]] = (),
+        background: tuple[float, float, float] = BACKGROUND,
+    ) -> None:
         """Start a frame: all of the target in the background colour, and rectangles (in its pixels, y downwards) in others.
 
         Clearing is the cheapest way of filling that there is, which counts where the processor draws.
@@ -172,7 +177,7 @@ class Canvas:
         framebuffer, (width, height) = target.framebuffer, target.size
         framebuffer.viewport = framebuffer.scissor = (0, 0, width, height)
         framebuffer.use()
-        framebuffer.clear(*BACKGROUND, 1.0)
+        framebuffer.clear(*background, 1.0)
         for area, colour in rectangles:
             left, right = round(area.x), round(area.x + area.width)
             top, bottom = round(area.y), round(area.y + area.height)

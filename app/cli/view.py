@@ -13,9 +13,15 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     """Declare the verb."""
     parser = add_verb(verbs, name, "open a light field in the viewer; the verb may be left out", "lfview capture.png")
     parser.add_argument(
-        "path", metavar="PATH", type=Path, nargs="?", help="an ESLF picture or a folder of views (default: the sample)"
+        "path",
+        metavar="PATH",
+        type=Path,
+        nargs="?",
+        help="a raw capture, an ESLF picture, a folder of views or of light fields (default: the start picture with the "
+        "files opened lately, the sample where there are none)",
     )
     add_model(parser)
+    parser.set_defaults(model=None)  # that of the last run, at first `full`
     parser.add_argument("--cache", type=count, default=512, metavar="MIB", help="memory for past syntheses (default: 512)")
     parser.add_argument(
         "--disk-cache",
@@ -43,10 +49,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _write_screenshot(options: argparse.Namespace) -> int:
     from app.offscreen import screenshot
+    from app.opening import DEFAULT_MODEL
     from assets import sample_path
     from lfcore.export import check_target
 
     out = check_target(options.screenshot, (".png",))
-    screenshot(options.path or sample_path(), out, options.model)
+    screenshot(options.path or sample_path(), out, options.model or DEFAULT_MODEL)
     print(f"{out}: the viewer on {options.path or 'the sample light field'}")
     return 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.commands import looking, moving, program, tabs, zooming
+from app.commands import around, looking, moving, program, tabs, zooming
 from app.commands.kinds import (
     LOOKING,
     MOVING,
@@ -11,6 +11,8 @@ from app.commands.kinds import (
     Action,
     Command,
     Context,
+    Ask,
+    Browse,
     Needs,
     OpenPath,
     Request,
@@ -30,6 +32,8 @@ __all__ = [
     "Context",
     "Needs",
     "OpenPath",
+    "Ask",
+    "Browse",
     "Request",
     "run",
 ]
@@ -45,9 +49,10 @@ COMMANDS: dict[str, Command] = {
 # What the mouse does, for the F1 page.
 GESTURES: tuple[tuple[str, str, str], ...] = (
     (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
+    **around.COMMANDS,
     (ZOOMING, "Wheel", "Zoom about the cursor"),
     (ZOOMING, "Right drag, Space + drag", "Move the picture"),
-    (PROGRAM, "Drop", "Open a file or folder"),
+    (PROGRAM, "Drop", "Open a file or folder, or choose from several"),
 )
 
 

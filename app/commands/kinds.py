@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 
+from app.dialogs import Purpose
 from app.geometry import Rect, Size
 from app.state import Grid, ViewState
 
@@ -21,6 +23,9 @@ class Action(Enum):
     CANCEL_OPEN = "cancel"
     DISMISS = "dismiss"
     QUIT = "quit"
+    UNDO = "undo"
+    REDO = "redo"
+    FORGET = "forget"
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,21 @@ class OpenPath:
     text: str
 
 
-Request = Action | OpenPath
+@dataclass(frozen=True)
+class Ask:
+    """Ask for a path by the system's own dialog, or in the window where there is none."""
+
+    purpose: Purpose
+
+
+@dataclass(frozen=True)
+class Browse:
+    """List the light fields of this folder; None: of the one around what is open, or was opened last."""
+
+    folder: Path | None
+
+
+Request = Action | OpenPath | Ask | Browse
 
 
 class Needs(Enum):
@@ -55,6 +74,7 @@ class Context:
     exhibits: int = 0
     models: tuple[str, ...] = ()  # to choose from
     model: str = ""
+    scale: float = 1.0  # of the interface
     requests: list[Request] = field(default_factory=list)
 
     @property

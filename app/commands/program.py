@@ -5,11 +5,6 @@ from __future__ import annotations
 from app.commands.kinds import PROGRAM, Action, Command, Context, Needs, request, toggle
 
 
-def _show_path_field(context: Context) -> None:
-    context.state.path_field = True
-    context.state.help = False
-
-
 def _escape(context: Context) -> None:
     """Put away what lies on top."""
     state = context.state
@@ -17,6 +12,8 @@ def _escape(context: Context) -> None:
         state.help = False
     elif state.path_field:
         state.path_field = False
+    elif state.desk.card is not None:
+        state.desk.card = None
     elif context.loading:
         context.requests.append(Action.CANCEL_OPEN)
     elif context.messages:
@@ -24,12 +21,11 @@ def _escape(context: Context) -> None:
 
 
 COMMANDS: dict[str, Command] = {
-    "open": Command(("Ctrl+O",), "Open a light field by its path", PROGRAM, _show_path_field, Needs.NOTHING),
     "sample": Command(("Ctrl+L",), "Open the sample light field", PROGRAM, request(Action.OPEN_SAMPLE), Needs.NOTHING),
     "close": Command(("Ctrl+W",), "Close what is open", PROGRAM, request(Action.CLOSE), Needs.PICTURE),
     "foresight": Command(("A",), "Compute views ahead in idle time, or not", PROGRAM, toggle("foresight"), Needs.NOTHING),
     "panel": Command(("Tab",), "Show or hide the panel", PROGRAM, toggle("panel"), Needs.NOTHING),
     "help": Command(("F1", "?"), "Show or hide this page", PROGRAM, toggle("help"), Needs.NOTHING),
-    "escape": Command(("Esc",), "Put away what lies on top: page, field, message, loading", PROGRAM, _escape, Needs.NOTHING),
+    "escape": Command(("Esc",), "Put away what lies on top: page, card, message, loading", PROGRAM, _escape, Needs.NOTHING),
     "quit": Command(("Ctrl+Q",), "End the program", PROGRAM, request(Action.QUIT), Needs.NOTHING),
 }

@@ -1,9 +1,24 @@
 """What lies over the picture and on top of everything, one module per thing."""
 
+from app.overlays.browser import browser
 from app.overlays.cards import loading, messages, path_field
 from app.overlays.key_page import key_page
 from app.overlays.labels import missing, notices
 from app.overlays.legend import legend
+from app.overlays.palette import palette
+from app.overlays.settings import settings
 from app.overlays.start import start
 
-__all__ = ["key_page", "legend", "loading", "messages", "missing", "notices", "path_field", "start"]
+__all__ = [
+    "browser",
+    "key_page",
+    "legend",
+    "loading",
+    "messages",
+    "missing",
+    "notices",
+    "palette",
+    "path_field",
+    "settings",
+    "start",
+]

@@ -5,42 +5,54 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app import theme
-from app.commands import Context
+from app.commands import COMMANDS, Context, OpenPath
+from app.desk import Shelf
 from app.geometry import Rect
-from app.widgets import button, card, em, font, packed, text, wrapped
+from app.overlays import tiles
+from app.widgets import CARD, button, card, em, font, text, wrapped
+
+_TILES = 8  # recent files at most, in rows of _ACROSS
+_ACROSS = 4
 
 
-def start(area: Rect, context: Context, fonts: theme.Fonts) -> None:
-    """What to do when nothing is open."""
-    with card("start", area, (0.5, 0.45), 25 * em()):
+def start(area: Rect, context: Context, shelf: Shelf, fonts: theme.Fonts) -> None:
+    """Three things to do, and the files opened lately."""
+    one, gap = tiles.size(), 0.3 * em()
+    padding = imgui.get_style().window_padding.x
+    across = max(min(_ACROSS, int((area.width - 2 * em() - 2 * padding + gap) // (one.x + gap))), 1)
+    shown = _recent_to_show(shelf, across, area.height - 15 * em())
+    width = across * (one.x + gap) - gap + 2 * padding if shown else 25 * em()
+    with card("start", area, (0.5, 0.45), width, CARD & ~imgui.WindowFlags_.no_scrollbar.value):
         with font(fonts.bold, theme.LARGE):
             text("Open a light field")
         wrapped("Drag in it, and see any view in between the captured ones.", theme.TEXT_SOFT)
         imgui.dummy(ImVec2(0, em() * 0.3))
-        width = 8.5 * em()
-        for label, command, words in (
-            ("Drop", None, "a file or folder on this window"),
-            ("Type its path", "open", "Ctrl+O"),
-            ("See the sample", "sample", "Ctrl+L"),
-        ):
-            if command is None:
-                _outlined(label, width)
-            else:
-                button(label, command, context, width)
+        for label, command in (("Open a file", "open"), ("Browse a folder", "open folder"), ("See the sample", "sample")):
+            button(label, command, context, 8.5 * em())
             imgui.same_line(0, em())
             imgui.align_text_to_frame_padding()
-            text(words, theme.TEXT_SOFT)
+            text(COMMANDS[command].keys[0], theme.TEXT_SOFT)
         imgui.dummy(ImVec2(0, em() * 0.3))
-        wrapped("F1 shows all keys.", theme.TEXT_FAINT)
+        wrapped("Or drop files and folders on this window. F1 shows all keys.", theme.TEXT_FAINT)
+        if shown:
+            _recent(shelf, shown, across, context, fonts)
 
 
-def _outlined(label: str, width: float) -> None:
-    """Looks like a button's outline: something to do with the mouse that is not a click."""
-    corner = imgui.get_cursor_screen_pos()
-    height = imgui.get_frame_height()
-    brush = imgui.get_window_draw_list()
-    end = ImVec2(corner.x + width, corner.y + height)
-    brush.add_rect(corner, end, packed(theme.FIELD_ACTIVE), imgui.get_style().frame_rounding)
-    size = imgui.calc_text_size(label)
-    brush.add_text(ImVec2(corner.x + (width - size.x) / 2, corner.y + (height - size.y) / 2), packed(theme.TEXT), label)
-    imgui.dummy(ImVec2(width, height))
+def _recent_to_show(shelf: Shelf, across: int, height: float) -> int:
+    """How many recent files there is room for, in whole rows."""
+    rows = min(int(height // tiles.size().y), _TILES // across)
+    return min(len(shelf.recent), rows * across) if rows > 0 else 0
+
+
+def _recent(shelf: Shelf, count: int, across: int, context: Context, fonts: theme.Fonts) -> None:
+    """Files opened lately; those that are not there any more come last."""
+    imgui.dummy(ImVec2(0, em() * 0.2))
+    with font(fonts.bold, theme.SMALL):
+        text("Recent", theme.TEXT_SOFT)
+    ordered = sorted(shelf.recent, key=lambda path: bool(shelf.thumbnail(path).reason))
+    gap = 0.3 * em()
+    for index, path in enumerate(ordered[:count]):
+        if index % across:
+            imgui.same_line(0, gap)
+        if tiles.tile(path, shelf.thumbnail(path), False):
+            context.requests.append(OpenPath(str(path)))

@@ -6,7 +6,6 @@ import contextlib
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfcore.errors import InputError
@@ -19,29 +18,14 @@ CONTAINERS = (".lfp", ".lfr", ".lfx")
 _LEVELS = 3
 
 
-@dataclass(frozen=True)
-class Collection:
-    """A folder, and what in it may be a light field (see `members`)."""
-
-    folder: Path
-    members: tuple[Path, ...]
-
-
-def collection_at(path: Path) -> Collection | None:
-    """The folder at this path as a collection; None where there is nothing to choose from. Raises InputError as `members`."""
-    inside = members(path)
-    return Collection(path, inside) if inside else None
-
-
-def collection_around(path: Path) -> Collection:
+def folder_around(path: Path) -> Path:
     """The nearest folder above this light field in which there are several to choose from.
 
     Raises InputError where there is none, or it cannot be read.
     """
     for folder in path.absolute().parents[:_LEVELS]:
-        found = collection_at(folder)
-        if found is not None:
-            return found
+        if members(folder):
+            return folder
     raise InputError(f"There are no other light fields in the folders around {path}; open another folder.")
 
 
