@@ -55,11 +55,11 @@ class Controller:
         self.exhibition: Exhibition | None = None  # what is open in place of a light field
         self.newest: Answer | None = None  # what is on screen, carried by its disparity map to the viewpoint
         self.picture: Answer | None = None  # the same, where it was made for exactly the viewpoint on screen
+        self.folder: Folder | None = None  # what there is to choose from in the browser
         self.messages: list[str] = []
         self._engine = engine
         self._loading = Loading(open_light_field, preview, wake)
         self._asking = Asking(engine, wake)
-        self.folder: Folder | None = None  # what there is to choose from in the browser
         self.previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
         self._models = models or {}
@@ -305,6 +305,9 @@ class Controller:
                 if self.previewing:
                     self._take(None)
                 self.say(loaded.message)
+            elif isinstance(loaded, Folder):
+                self.folder = loaded
+                self.state.desk.show(Card.BROWSER)
             else:
                 self._take(loaded)
         for answered in self._asking.news():
@@ -340,9 +343,6 @@ class Controller:
     def _follows_seamlessly(self, answer: Answer) -> bool:
         """Whether the answer can take the place of what is on screen without a fade: one quick synthesis after another,
         carried a short way, differ by less than can be seen (docs/speed.md), and a fade would only cost time."""
-            elif isinstance(loaded, Folder):
-                self.folder = loaded
-                self.state.desk.show(Card.BROWSER)
         newest = self.newest
         if newest is None or not newest.step is answer.step is Step.REALTIME:
             return False

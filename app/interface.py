@@ -15,16 +15,16 @@ from app.canvas import Canvas, Colours, Frame, Target
 from app.canvas.atlas import Atlas
 from app.commands import Action, OpenPath, Request
 from app.controller import Controller
-from app.engine import Answer
 from app.desk import Placed
+from app.engine import Answer
 from app.exhibits import Exhibit
-from app.geometry import Placement, Rect, place
 from app.gallery import Seen
+from app.geometry import Placement, Rect, place
 from app.layout import Layout
-from app.state import Look, Step
 from app.settings import Theme
-from assets import sample_path
+from app.state import Look, Step
 from app.surroundings import Surroundings
+from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.lightfield import CORNERS, LightField
 
@@ -39,14 +39,14 @@ class Interface:
         self, controller: Controller, context: moderngl.Context, scale: float, surroundings: Surroundings | None = None
     ) -> None:
         self.controller = controller
-        self.closing = False
         self.surroundings = surroundings or Surroundings(controller, wake=lambda: None)
         self.surroundings.picture_of = self._picture_of
+        self.closing = False
         self._canvas = Canvas(context)
-        self._fonts = theme.apply(scale)
         self._atlas = Atlas(context)
-        self._scale = scale
+        self._fonts = theme.apply(scale)
         self._theme = Theme.DARK
+        self._scale = scale
         self._light_field: LightField | None = None  # what the canvas has taken
         self._answer: Answer | None = None
         self._captured: int | None = None
@@ -66,10 +66,10 @@ class Interface:
     def draw(self, target: Target, now: float) -> None:
         """Draw one frame. imgui's display size and events must have been set (by its platform backend); `now` in seconds."""
         self.controller.tick(now)
-        imgui.backends.opengl3_new_frame()
         self.surroundings.arrive()
         self._change_theme()
         self._atlas.begin()
+        imgui.backends.opengl3_new_frame()
         imgui.new_frame()
         display = imgui.get_io().display_size
         state = self.controller.state
@@ -80,8 +80,8 @@ class Interface:
         for request in requests:
             self._fulfil(request)
         self.controller.tick(now)
-        self._synchronise()
         self.surroundings.tick(now, imgui.is_any_mouse_down())
+        self._synchronise()
         self._synchronise_exhibit()
         pixels = target.size[0] / max(display.x, 1.0)
         grounds = [area for area in (layout.panel, layout.status) if area is not None]
@@ -102,8 +102,8 @@ class Interface:
         """Give imgui's GL objects back; the context must still be current."""
         self._canvas.clear()
         self._canvas.clear_exhibit()
-        imgui.backends.opengl3_shutdown()
         self._atlas.release()
+        imgui.backends.opengl3_shutdown()
 
     def _fulfil(self, request: Request) -> None:
         controller = self.controller
@@ -119,7 +119,6 @@ class Interface:
             controller.dismiss()
         elif request is Action.QUIT:
             self.closing = True
-
         else:
             self.surroundings.fulfil(request)
 
@@ -134,6 +133,7 @@ class Interface:
         if seen.glance is None or seen.glance.picture is None:
             return None
         return self._atlas.place(seen.number, seen.glance.picture)
+
     def _synchronise(self) -> None:
         """Hand to the canvas what it has not yet taken."""
         controller, canvas = self.controller, self._canvas
@@ -214,17 +214,17 @@ class Interface:
             tone=state.looking.tone,
             gain=state.gain,
             disparity_range=controller.disparity_range or (0.0, 1.0),
-            dim=dim,
             colour_map=state.looking.colour_map,
             level=state.looking.level,
+            dim=dim,
         )
 
 
-def _scaled(area: Rect, pixels: float) -> Rect:
 def _rgb(colour: ImVec4) -> tuple[float, float, float]:
     return colour.x, colour.y, colour.z
 
 
+def _scaled(area: Rect, pixels: float) -> Rect:
     """From window units to framebuffer pixels."""
     return Rect(area.x * pixels, area.y * pixels, area.width * pixels, area.height * pixels)
 

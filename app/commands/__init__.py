@@ -9,10 +9,10 @@ from app.commands.kinds import (
     PROGRAM,
     ZOOMING,
     Action,
-    Command,
-    Context,
     Ask,
     Browse,
+    Command,
+    Context,
     Needs,
     OpenPath,
     Request,
@@ -28,12 +28,12 @@ __all__ = [
     "PROGRAM",
     "ZOOMING",
     "Action",
+    "Ask",
+    "Browse",
     "Command",
     "Context",
     "Needs",
     "OpenPath",
-    "Ask",
-    "Browse",
     "Request",
     "run",
 ]
@@ -43,13 +43,13 @@ COMMANDS: dict[str, Command] = {
     **moving.COMMANDS,
     **zooming.COMMANDS,
     **tabs.COMMANDS,
+    **around.COMMANDS,
     **program.COMMANDS,
 }
 
 # What the mouse does, for the F1 page.
 GESTURES: tuple[tuple[str, str, str], ...] = (
     (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
-    **around.COMMANDS,
     (ZOOMING, "Wheel", "Zoom about the cursor"),
     (ZOOMING, "Right drag, Space + drag", "Move the picture"),
     (PROGRAM, "Drop", "Open a file or folder, or choose from several"),

@@ -22,10 +22,10 @@ class Action(Enum):
     OPEN_SAMPLE = "sample"
     CANCEL_OPEN = "cancel"
     DISMISS = "dismiss"
-    QUIT = "quit"
     UNDO = "undo"
     REDO = "redo"
     FORGET = "forget"
+    QUIT = "quit"
 
 
 @dataclass(frozen=True)
