@@ -200,10 +200,10 @@ class Controller:
     @property
     def disparity_range(self) -> tuple[float, float] | None:
         """The disparities at either end of the colour map, px over the baseline."""
-        answer = self.picture or self.newest
-        if answer is None or answer.percentiles is None:
         if self.state.looking.hand_range is not None:
             return self.state.looking.hand_range
+        answer = self.picture or self.newest
+        if answer is None or answer.percentiles is None:
             return None
         return disparity_range(answer.percentiles, self.state.tail)
 
