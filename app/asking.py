@@ -24,17 +24,21 @@ class Task(Enum):
     SAVE = "writing a view to disk"
     FETCH = "bringing a view from disk"
     AHEAD = "a viewpoint that may be wanted next"
+    COMPARE = "the viewpoint, by another model"
+    SCORE = "the score of a captured view"
 
 
 FOR_NOW = (Task.QUICK, Task.FINAL)
+GIVES_WAY = (Task.AHEAD, Task.COMPARE, Task.SCORE)  # to anything else, at once
 
 
 @dataclass(frozen=True)
 class Wish:
-    """One thing to be done, for one viewpoint."""
+    """One thing to be done, for one viewpoint; `model` tells apart what is done for it by several models."""
 
     task: Task
     at: Point
+    model: str = ""
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,7 @@ class NotAnswered:
 class Answered:
     """A wish has been fulfilled; `answer` is what there is to show of it."""
 
+    wish: Wish
     answer: Answer | None
 
 
@@ -57,7 +62,7 @@ class Asking:
     def __init__(self, engine: Engine, wake: Callable[[], None]) -> None:
         self.wish: Wish | None = None
         self._engine = engine
-        self._worker: LatestWorker[Answer | None] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
+        self._worker: LatestWorker[Answered] = LatestWorker("synthesis", wake, SYNTHESIS_NICENESS)
         self._ticket = 0  # of the latest wish
         self._first_ticket = 0  # of the first wish that still counts
 
@@ -74,7 +79,7 @@ class Asking:
                 self._worker.cancel_all()
                 return
             self._ticket = self._worker.submit(self._job(light_field, wish))
-            if before is not None and before.task is not Task.QUICK and (self._engine.quick or before.task is Task.AHEAD):
+            if before is not None and before.task is not Task.QUICK and (self._engine.quick or before.task in GIVES_WAY):
                 self._worker.cancel_before(self._ticket)
         running = self._worker.running
         if useless and running is not None and running < self._ticket and not self._engine.quick:
@@ -97,7 +102,7 @@ class Asking:
             if not isinstance(outcome, Done):
                 yield NotAnswered(outcome.message)
             elif outcome.ticket >= self._first_ticket:
-                yield Answered(outcome.value)
+                yield outcome.value
 
     @property
     def busy(self) -> bool:
@@ -108,20 +113,25 @@ class Asking:
         """End the thread."""
         self._worker.stop(timeout)
 
-    def _job(self, light_field: LightField, wish: Wish) -> Job[Answer | None]:
+    def _job(self, light_field: LightField, wish: Wish) -> Job[Answered]:
         engine, (u, v) = self._engine, wish.at
 
-        def job(cancelled: Cancel) -> Answer | None:
+        def job(cancelled: Cancel) -> Answered:
+            answer = None
             if wish.task is Task.QUICK:
-                return engine.quick_answer(light_field, u, v, cancelled)
-            if wish.task is Task.FINAL:
-                return engine.answer(light_field, u, v, cancelled)
-            if wish.task is Task.SAVE:
+                answer = engine.quick_answer(light_field, u, v, cancelled)
+            elif wish.task is Task.FINAL:
+                answer = engine.answer(light_field, u, v, cancelled)
+            elif wish.task is Task.COMPARE:
+                answer = engine.answer_by(wish.model, light_field, u, v, cancelled)
+            elif wish.task is Task.SCORE:
+                engine.find_score(light_field, u, v, cancelled)
+            elif wish.task is Task.SAVE:
                 engine.save_one()
             elif wish.task is Task.FETCH:
                 engine.fetch(light_field, u, v)
             else:
                 engine.answer(light_field, u, v, cancelled)
-            return None
+            return Answered(wish, answer)
 
         return job

@@ -14,15 +14,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from app.asking import FOR_NOW, Asking, NotAnswered, Task, Wish
+from app.asking import FOR_NOW, GIVES_WAY, Asking, NotAnswered, Task, Wish
+from app.comparing import Comparing
+from app.comparison import CAPTURED_VIEW, Source
 from app.desk import Card, Folder
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
-from app.readout import Readout
-from app.state import CARRIED_NEAR, Grid, Look, Step, ViewState, carried_share
+from app.readout import Compared, Readout
+from app.scoreboard import Scoreboard
+from app.state import CARRIED_NEAR, Grid, Look, Step, Tab, ViewState, carried_share
 from lfcore.cache import rounded
 from lfcore.lightfield import LightField
 
@@ -63,6 +66,10 @@ class Controller:
         self.previewing = False  # what is on screen stands in for the light field that is being opened
         self._model = model
         self._models = models or {}
+        for name, choice in self._models.items():
+            engine.know(name, choice.make)
+        self.comparing = Comparing(engine, wake)
+        self._scoreboard = Scoreboard(engine, self._models)
         self._grid: Grid | None = None
         self._next: Answer | None = None  # has come while the one before is still being faded in
         self._shown: Point | None = None  # viewpoint at the last tick
@@ -111,13 +118,14 @@ class Controller:
         """The person does something: whatever is being computed ahead stops at once."""
         self._acted = True
         wish = self._asking.wish
-        if wish is not None and wish.task is Task.AHEAD:
+        if wish is not None and wish.task in GIVES_WAY and wish != self.comparing.wish():
             self._asking.give_up()
 
     def stop(self) -> None:
         """End the threads, waiting a little for work that cannot be broken off at once."""
         self._loading.stop(STOP_SECONDS)
         self._asking.stop(STOP_SECONDS)
+        self.comparing.stop()
 
     # Once a frame.
 
@@ -141,6 +149,7 @@ class Controller:
         if self._next is not None and self.share >= 1.0:
             answer, self._next = self._next, None
             self._accept(answer)
+        self._compare(self.light_field)
         self._compare(self.light_field)
         if not self.previewing:
             useless = self._resting and self._newest_disparity  # what was asked for elsewhere, to be carried here
@@ -176,7 +185,7 @@ class Controller:
             return None
         if not self._resting:
             return max(self._moved_at + REST_SECONDS - self._now, 0.0) + 1e-3
-        if not self._quiet and self.state.foresight:
+        if not self._quiet and self._has_idle_work:
             return max(self._acted_at, self._moved_at) + QUIET_SECONDS - self._now + 1e-3
         return None
 
@@ -234,6 +243,7 @@ class Controller:
             has_disparity=self._newest_disparity,
             disparity_under_cursor=self._disparity_under_cursor(),
             captured_here=self.captured_here,
+            compared=self._compared(),
             captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
             value_under_cursor=self._value_under_cursor(),
             cached=tuple(self._cached),
@@ -255,7 +265,7 @@ class Controller:
         if self.newest is not None:
             self.newest = replace(self.newest, final=False)
         if self.light_field is not None:
-            self._cached = dict.fromkeys(self._engine.cached_positions(self.light_field))
+            self._count(self.light_field)
             self._look_up(self.light_field)
 
     @property
@@ -265,6 +275,23 @@ class Controller:
     @property
     def _quiet(self) -> bool:
         return self._now - max(self._acted_at, self._moved_at) >= QUIET_SECONDS
+
+    @property
+    def _has_idle_work(self) -> bool:
+        return self.state.foresight or self.state.comparison.all_views or self._wants_table
+
+    @property
+    def _wants_table(self) -> bool:
+        """Whether the table of models is looked at, and there is a captured view to score them against."""
+        return self.state.panel and self.state.tab is Tab.COMPARE and self.captured_here is not None
+
+    @property
+    def has_partner(self) -> bool:
+        """Whether what the picture is compared with has a picture of this viewpoint."""
+        source = self.state.comparison.source
+        if source is Source.CAPTURED:
+            return self.captured_here is not None
+        return self._newest_disparity if source is Source.INSTANT else self.comparing.answer is not None
 
     @property
     def _shows_captured(self) -> bool:
@@ -282,6 +309,7 @@ class Controller:
         self.previewing = False
         self.newest = self.picture = self._next = None
         self._asking.forget()
+        self.comparing.forget()
         self._shown = None
         self._heading = (0.0, 0.0)
         self._grid = None
@@ -294,7 +322,14 @@ class Controller:
         if light_field is not None:
             size = (light_field.rows, light_field.columns, light_field.width, light_field.height)
             self._grid = Grid(*size, light_field.dark)
-            self._cached = dict.fromkeys(self._engine.cached_positions(light_field))
+            self._count(light_field)
+        else:
+            self._scoreboard.refresh(None, None)
+
+    def _count(self, light_field: LightField) -> None:
+        """Which viewpoints are in memory, and which have scores."""
+        self._cached = dict.fromkeys(self._engine.cached_positions(light_field))
+        self._scoreboard.refresh(light_field, self._grid)
 
     def _collect(self) -> None:
         for loaded in self._loading.news():
@@ -315,9 +350,15 @@ class Controller:
                 self.say(answered.message)
                 self._faulted = True
             elif self.light_field is not None:
-                self._cached = dict.fromkeys(self._engine.cached_positions(self.light_field))
-                if answered.answer is not None:
+                self._count(self.light_field)
+                if answered.answer is None:
+                    continue
+                if answered.wish.task is Task.COMPARE:
+                    self.comparing.take(answered.wish, answered.answer)
+                else:
                     self._accept(answered.answer)
+        for message in self.comparing.news():
+            self.say(message)
 
     def _accept(self, answer: Answer) -> None:
         """Show an answer, unless something better is on screen, once what is there has been faded in."""
@@ -378,21 +419,54 @@ class Controller:
             return Wish(Task.FINAL, here)
         return self._wanted_later(light_field) if self._resting else None
 
+    def _compare(self, light_field: LightField) -> None:
+        """The picture on screen against its partner."""
+        state = self.state
+        if state.comparison.model is not None and state.comparison.model not in self._models:
+            state.comparison = replace(state.comparison, partner=CAPTURED_VIEW)
+        self.comparing.follow(light_field, self.viewpoint, state.comparison)
+        self.comparing.measure(light_field, self.picture, state.comparison, state.look is Look.ERROR)
+
+    def _compared(self) -> Compared:
+        light_field, measured = self.light_field, self.comparing.measured
+        if light_field is None:
+            return Compared()
+        against_captured = self.state.comparison.source is Source.CAPTURED
+        score = self.picture.score if against_captured and self.picture else measured.score if measured else None
+        return Compared(
+            self.has_partner,
+            score,
+            measured is not None and measured.difference is self.state.comparison.difference,
+            self._scoreboard.table(light_field, self.viewpoint) if self._wants_table else (),
+            self._scoreboard.views,
+        )
+
     def _wanted_later(self, light_field: LightField) -> Wish | None:
         """What there is to do while the hand rests on a finished picture."""
         engine = self._engine
+        partner = self.comparing.wish()
+        if partner is not None:
+            return partner
         unsaved = engine.unsaved
         if unsaved is not None:
-            return Wish(Task.SAVE, unsaved)
+            return Wish(Task.SAVE, (unsaved.u, unsaved.v), unsaved.model)
         stored = engine.stored_position(light_field)
         if stored is not None:
             return Wish(Task.FETCH, stored)
-        if not self.state.foresight or not self._quiet or self._grid is None or not engine.has_room(light_field):
+        if not self._quiet or self._grid is None:
             return None
-        for point in viewpoints_ahead(self.viewpoint, self._heading, self._grid):
-            if rounded(*point) not in self._cached:
-                return Wish(Task.AHEAD, point)
-        return None
+        missing = self._scoreboard.missing_model(light_field, self.viewpoint) if self._wants_table else None
+        if missing is not None:
+            return Wish(Task.COMPARE, self.viewpoint, missing)
+        unscored = self._scoreboard.missing_view(self._grid, self.viewpoint)
+        if self.state.comparison.all_views and unscored is not None:
+            return Wish(Task.SCORE, unscored)
+        if self.state.foresight and engine.has_room(light_field):
+            for point in viewpoints_ahead(self.viewpoint, self._heading, self._grid):
+                if rounded(*point) not in self._cached:
+                    return Wish(Task.AHEAD, point)
+        unscored = self._scoreboard.missing_view(self._grid, self.viewpoint, self._cached)  # which costs little
+        return Wish(Task.SCORE, unscored) if unscored is not None else None
 
     def _magnet(self, light_field: LightField) -> None:
         assert self._grid is not None
@@ -424,7 +498,10 @@ class Controller:
             captured = captured_viewpoints(self._grid)
             done = sum(rounded(*point) in self._cached for point in captured)
             return f"computing ahead, {done} of {len(captured)}"
-        return ""
+        if wish.task is Task.SCORE and self._grid is not None:
+            done = sum(score is not None for score in self._scoreboard.views)
+            return f"scoring captured views, {done} of {len(captured_viewpoints(self._grid))}"
+        return f"synthesizing by {wish.model}" if wish.task is Task.COMPARE else ""
 
     def _disparity_under_cursor(self) -> float | None:
         return None if self.picture is None else _at_cursor(self.picture.synthesis.disparity, self.state.cursor)

@@ -15,12 +15,13 @@ import numpy.typing as npt
 
 from app.geometry import Point
 from app.readout import ScoreText
+from app.scoring import score as scored
 from app.state import Step
 from app.worker import Cancel
 from lfcore.cache import CacheKey, SynthesisCache, cache_key, held_bytes
 from lfcore.errors import LfviewError, OutputError
 from lfcore.lightfield import FloatArray, LightField
-from lfcore.metrics import K16_CROP, k16, psnr, ssim, to_uint8
+from lfcore.metrics import to_uint8
 from lfcore.store import ViewStore
 
 if TYPE_CHECKING:
@@ -109,8 +110,8 @@ class Engine:
         self._quick = _Model(make_quick) if make_quick is not None else None
         self._store = store
         self._tidied = False
-        self._stored_of: LightField | None = None
-        self._stored: frozenset[Point] = frozenset()  # viewpoints on disk, of that light field
+        self._stored_of: tuple[str, str] | None = None  # content of a light field, key of the model for a hand at rest
+        self._stored: frozenset[Point] = frozenset()  # viewpoints of these on disk
         self._unsaved: dict[CacheKey, None] = {}  # in the order in which they came
         self._scores: dict[CacheKey, ScoreText] = {}
 
@@ -120,9 +121,14 @@ class Engine:
         stands_in: whether the quick model may serve while the hand moves. Belongs to the main thread; a query that runs is
         answered by the model it began with.
         """
+        self.know(name, make_synthesizer)
         self._stands_in = stands_in
-        self._final = self._models.setdefault(name, _Model(make_synthesizer))
+        self._final = self._models[name]
         self._stored_of, self._stored = None, frozenset()
+
+    def know(self, name: str, make_synthesizer: MakeSynthesizer) -> None:
+        """Make a model known by its name, if it is not yet; it is loaded when it is first asked for something."""
+        self._models.setdefault(name, _Model(make_synthesizer))
 
     @property
     def ready(self) -> bool:
@@ -146,32 +152,63 @@ class Engine:
 
     def answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
         """The synthesis of (u, v), from memory, from disk or by the model, with its score."""
-        known = self.cached(light_field, u, v)
+        return self._answered(self._final, light_field, u, v, cancelled)
+
+    def answer_by(self, name: str, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
+        """The same by a known model, whichever serves the hand."""
+        return self._answered(self._models[name], light_field, u, v, cancelled)
+
+    def cached(self, light_field: LightField, u: float, v: float) -> Answer | None:
+        """The answer for (u, v) if its synthesis is in memory; quick enough for the frame loop."""
+        return self._cached(self._final, light_field, u, v)
+
+    def cached_by(self, name: str, light_field: LightField, u: float, v: float) -> Answer | None:
+        """The same by a known model."""
+        return self._cached(self._models[name], light_field, u, v)
+
+    def failed_by(self, name: str) -> bool:
+        """Whether a known model could not be loaded."""
+        return self._models[name].failure is not None
+
+    def score_by(self, name: str, light_field: LightField, u: float, v: float) -> ScoreText | None:
+        """The score of a known model at (u, v), if it has been found."""
+        synthesizer = self._models[name].synthesizer
+        return None if synthesizer is None else self._scores.get(cache_key(light_field, synthesizer, u, v))
+
+    def scores(self, light_field: LightField) -> dict[Point, ScoreText]:
+        """The scores found for the model for a hand at rest, by viewpoint as caches know it."""
+        synthesizer = self._final.synthesizer
+        if synthesizer is None:
+            return {}
+        of = (light_field.content_key, synthesizer.key)
+        return {(key.u, key.v): found for key, found in self._scores.copy().items() if (key.content, key.model) == of}
+
+    def _answered(self, model: _Model, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
+        known = self._cached(model, light_field, u, v)
         if known is not None and (known.score is not None or light_field.at(u, v) is None):
             return known
-        model = self._final
-        synthesizer = model.prepare()
-        key = cache_key(light_field, synthesizer, u, v)
-        synthesis = known.synthesis if known is not None else self._from_disk(light_field, key, u, v)
+        key = cache_key(light_field, model.prepare(), u, v)
+        synthesis = known.synthesis if known is not None else self._from_disk(model, light_field, key, u, v)
         kept = synthesis is not None
         if synthesis is None:
             synthesis = model.synthesize(light_field, u, v, cancelled)
             if self._store is not None:
                 self._unsaved[key] = None
         self.cache.put(key, synthesis)
-        score = _score(light_field, synthesis)
-        if score is not None:
+        return _answer(synthesis, final=True, kept=kept, score=self._keep_score(light_field, key, synthesis))
+
+    def _keep_score(self, light_field: LightField, key: CacheKey, synthesis: Synthesis) -> ScoreText | None:
+        found = _score(light_field, synthesis)
+        if found is not None:
             if len(self._scores) >= SCORES_KEPT:
                 self._scores.pop(next(iter(self._scores)))
-            self._scores[key] = score
-        return _answer(synthesis, final=True, kept=kept, score=score)
+            self._scores[key] = found
+        return found
 
-    def cached(self, light_field: LightField, u: float, v: float) -> Answer | None:
-        """The answer for (u, v) if its synthesis is in memory; quick enough for the frame loop."""
-        synthesizer = self._final.synthesizer
-        if synthesizer is None:
+    def _cached(self, model: _Model, light_field: LightField, u: float, v: float) -> Answer | None:
+        if model.synthesizer is None:
             return None
-        key = cache_key(light_field, synthesizer, u, v)
+        key = cache_key(light_field, model.synthesizer, u, v)
         synthesis = self.cache.get(key)
         if synthesis is None:
             return None
@@ -187,10 +224,9 @@ class Engine:
     # What is done while nothing is asked.
 
     @property
-    def unsaved(self) -> Point | None:
-        """The viewpoint of a view that is to be written to disk, or None."""
-        key = next(iter(tuple(self._unsaved)), None)
-        return None if key is None else (key.u, key.v)
+    def unsaved(self) -> CacheKey | None:
+        """A view that is to be written to disk, or None."""
+        return next(iter(tuple(self._unsaved)), None)
 
     def save_one(self) -> None:
         """Write a view to disk. Raises OutputError once, and then goes on without the disk."""
@@ -199,11 +235,15 @@ class Engine:
         key = next(iter(self._unsaved))
         del self._unsaved[key]
         synthesis = self.cache.get(key)
-        if synthesis is None:
+        if synthesis is not None:
+            self._keep_on_disk(key, synthesis)
+
+    def _keep_on_disk(self, key: CacheKey, synthesis: Synthesis) -> None:
+        if self._store is None:
             return
         try:
             self._store.put(key, synthesis)
-            if self._stored_of is not None and self._stored_of.content_key == key.content:
+            if self._stored_of == (key.content, key.model):
                 self._stored |= {(key.u, key.v)}
         except OutputError as error:
             self._store = None
@@ -213,43 +253,58 @@ class Engine:
 
     def stored_position(self, light_field: LightField) -> Point | None:
         """A viewpoint of this light field that is on disk, not in memory, and for which there is room there, or None."""
-        if self._stored_of is not light_field or not self.has_room(light_field):
+        synthesizer = self._final.synthesizer
+        if synthesizer is None or self._stored_of != (light_field.content_key, synthesizer.key):
+            return None
+        if not self.has_room(light_field):
             return None
         return next(iter(self._stored.difference(self.cached_positions(light_field))), None)
 
     def fetch(self, light_field: LightField, u: float, v: float) -> None:
         """Bring a view from disk into memory."""
-        synthesizer = self._final.prepare()
-        key = cache_key(light_field, synthesizer, u, v)
-        synthesis = self._from_disk(light_field, key, u, v)
+        model = self._final
+        key = cache_key(light_field, model.prepare(), u, v)
+        synthesis = self._from_disk(model, light_field, key, u, v)
         if synthesis is not None:
             self.cache.put(key, synthesis)
+
+    def find_score(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> None:
+        """Score the view at (u, v), a captured one. Its synthesis is kept in memory only where there is room."""
+        model = self._final
+        key = cache_key(light_field, model.prepare(), u, v)
+        synthesis = self.cache.get(key) or self._from_disk(model, light_field, key, u, v)
+        if synthesis is None and self.has_room(light_field):
+            self._answered(model, light_field, u, v, cancelled)
+            return
+        if synthesis is None:
+            synthesis = model.synthesize(light_field, u, v, cancelled)
+            self._keep_on_disk(key, synthesis)
+        self._keep_score(light_field, key, dataclasses.replace(synthesis, u=u, v=v))
 
     def has_room(self, light_field: LightField) -> bool:
         """Whether memory holds another view of this light field without driving one out."""
         wanted = held_bytes(light_field.height, light_field.width)
         return self.cache.bytes_used + wanted <= (1 - _ROOM_LEFT) * self.cache.limit_bytes
 
-    def _from_disk(self, light_field: LightField, key: CacheKey, u: float, v: float) -> Synthesis | None:
+    def _from_disk(self, model: _Model, light_field: LightField, key: CacheKey, u: float, v: float) -> Synthesis | None:
         if self._store is None:
             return None
-        if self._stored_of is not light_field:
-            self._list_stored(light_field, key)
-        if (key.u, key.v) not in self._stored:
-            return None
+        if model is self._final and self._stored_of != (key.content, key.model):
+            self._list_stored(key)
         synthesis = self._store.get(key, (light_field.height, light_field.width))
         if synthesis is None:
-            self._stored -= {(key.u, key.v)}  # damaged, or removed by another program
+            if self._stored_of == (key.content, key.model):
+                self._stored -= {(key.u, key.v)}  # damaged, or removed by another program
             return None
         return dataclasses.replace(synthesis, u=u, v=v)
 
-    def _list_stored(self, light_field: LightField, key: CacheKey) -> None:
+    def _list_stored(self, key: CacheKey) -> None:
         assert self._store is not None
         if not self._tidied:
             self._tidied = True
             self._store.tidy()
         self._stored = frozenset(self._store.positions(key.content, key.model))
-        self._stored_of = light_field
+        self._stored_of = (key.content, key.model)
 
 
 def _answer(synthesis: Synthesis, *, final: bool, kept: bool, score: ScoreText | None) -> Answer:
@@ -265,16 +320,9 @@ def _pixels(image: FloatArray) -> npt.NDArray[np.uint8]:
 
 
 def _score(light_field: LightField, synthesis: Synthesis) -> ScoreText | None:
-    """The score against the captured view at the synthesis's viewpoint: by K16, or of the whole picture if it is small."""
+    """The score against the captured view at the synthesis's viewpoint, None where there is none."""
     place = light_field.at(synthesis.u, synthesis.v)
-    if place is None:
-        return None
-    truth = light_field.view(*place)
-    if min(truth.shape[:2]) > 2 * K16_CROP + 11:
-        score = k16(synthesis.image, truth)
-        return ScoreText(score.psnr, score.ssim, "K16: 8 bits, 22 px cropped")
-    a, b = to_uint8(synthesis.image), to_uint8(truth)
-    return ScoreText(psnr(a, b), ssim(a, b), "8 bits, whole picture")
+    return None if place is None else scored(synthesis.image, light_field.view(*place))
 
 
 def _percentiles(disparity: FloatArray | None) -> tuple[float, ...] | None:

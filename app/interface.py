@@ -14,6 +14,8 @@ from app import panels, theme
 from app.canvas import Canvas, Colours, Frame, Target
 from app.canvas.atlas import Atlas
 from app.commands import Action, OpenPath, Request
+from app.comparing import Comparing
+from app.comparison import Source
 from app.controller import Controller
 from app.desk import Placed
 from app.engine import Answer
@@ -21,12 +23,13 @@ from app.exhibits import Exhibit
 from app.gallery import Seen
 from app.geometry import Placement, Rect, place
 from app.layout import Layout
+from app.panes import arrange
 from app.settings import Theme
 from app.state import Look, Step
 from app.surroundings import Surroundings
 from assets import sample_path
 from lfcore.errors import LfviewError
-from lfcore.lightfield import CORNERS, LightField
+from lfcore.lightfield import CORNERS, FloatArray, LightField
 
 GLSL_VERSION = "#version 330 core"
 DIMMED = 0.35
@@ -50,6 +53,8 @@ class Interface:
         self._light_field: LightField | None = None  # what the canvas has taken
         self._answer: Answer | None = None
         self._captured: int | None = None
+        self._partner: Answer | None = None
+        self._map: FloatArray | None = None
         self._exhibit: Exhibit | None = None  # likewise
         self._timer = self._canvas.timer()
         self._timed = False  # a picture was made in the last frame
@@ -140,7 +145,7 @@ class Interface:
         light_field = controller.light_field
         if light_field is not self._light_field:
             self._light_field = None
-            self._answer = self._captured = None
+            self._answer = self._captured = self._partner = self._map = None
             canvas.clear()
             if light_field is not None:
                 corners = np.stack([light_field.views[-int(v), -int(u)] for u, v in CORNERS])  # (4, H, W, 3)
@@ -162,6 +167,21 @@ class Interface:
         if captured is not None and captured != self._captured:
             canvas.set_captured(light_field.views[divmod(captured, light_field.columns)])
             self._captured = captured
+        self._synchronise_partner(controller.comparing)
+
+    def _synchronise_partner(self, comparing: Comparing) -> None:
+        """The same for what the picture is compared with."""
+        canvas, answer, measured = self._canvas, comparing.answer, comparing.measured
+        if answer is not None and answer is not self._partner:
+            canvas.set_partner(answer.synthesis.image)
+            self._partner = answer
+        values = measured.values if measured is not None else None
+        if values is not None and values is not self._map:
+            canvas.set_map(values)
+        self._map = values
+        picture = self.controller.picture
+        if comparing.instant_wanted and picture is not None:
+            comparing.take_instant(picture, canvas.read(self._instant_frame()))
 
     def _synchronise_exhibit(self) -> None:
         """The same for what a Lytro file without raw shows."""
@@ -193,16 +213,20 @@ class Interface:
         frame = self._frame()
         with self._timer:
             self._timed = self._canvas.prepare(frame)
-        area = layout.picture
-        placement = place(self.controller.state.zoom, self._canvas.picture_size(frame.look), area)
-        self._canvas.draw(frame, target, _scaled(area, pixels), _magnified(placement, pixels))
+        state = self.controller.state
+        for pane in arrange(state, layout.picture):
+            shown = self._partner_frame() if pane.partner else frame
+            placement = pane.placement(state.zoom, self._canvas.picture_size(shown.look))
+            self._canvas.draw(shown, target, _scaled(pane.clip, pixels), _magnified(placement, pixels))
 
     def _frame(self) -> Frame:
         """What the picture is to show; dimmed where the chosen look has nothing to show here."""
         controller = self.controller
         state = controller.state
+        comparison = state.comparison
         look, dim = state.look, 1.0
-        if look is Look.ERROR and controller.captured_here is None:
+        mapped = not comparison.difference.measured or self._map is not None
+        if look is Look.ERROR and not (controller.has_partner and mapped):
             look, dim = Look.SYNTHESIS, DIMMED
         if look.needs_disparity and not self._canvas.has_disparity:
             look, dim = Look.SYNTHESIS, DIMMED
@@ -210,7 +234,9 @@ class Interface:
             look,
             controller.viewpoint,
             share=controller.share,
-            captured=controller.step is Step.CAPTURED,
+            source=Source.CAPTURED if controller.step is Step.CAPTURED else Source.SYNTHESIS,
+            partner=comparison.source,
+            difference=comparison.difference,
             tone=state.looking.tone,
             gain=state.gain,
             disparity_range=controller.disparity_range or (0.0, 1.0),
@@ -218,6 +244,23 @@ class Interface:
             level=state.looking.level,
             dim=dim,
         )
+
+    def _partner_frame(self) -> Frame:
+        """What the picture is compared with; where that has none here, the picture, dimmed."""
+        controller, state = self.controller, self.controller.state
+        there = controller.has_partner
+        return Frame(
+            Look.SYNTHESIS,
+            controller.viewpoint,
+            share=controller.share,
+            source=state.comparison.source if there else Source.SYNTHESIS,
+            tone=state.looking.tone,
+            dim=1.0 if there else DIMMED,
+        )
+
+    def _instant_frame(self) -> Frame:
+        """The instant picture in the values that are stored."""
+        return Frame(Look.SYNTHESIS, self.controller.viewpoint, source=Source.INSTANT)
 
 
 def _rgb(colour: ImVec4) -> tuple[float, float, float]:

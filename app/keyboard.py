@@ -44,6 +44,8 @@ def run_pressed(context: commands.Context) -> None:
     for name, command in commands.COMMANDS.items():
         if any(_pressed(key, typed, typing, held) for key in command.keys) and not io.key_alt:
             commands.run(name, context)
+        if command.released is not None and any(imgui.is_key_released(key) for cap in command.keys for key in _KEYS[cap]):
+            command.released(context)
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def _pressed(name: str, typed: str, typing: bool, held: _Held) -> bool:
     shifted = held.shift and cap != "Plus"  # which has its key to itself on some keyboards, and needs Shift on others
     if (held.ctrl, shifted) != (ctrl, shift) or (typing and not held.ctrl and name not in _WHILE_TYPING):
         return False
-    return any(imgui.is_key_pressed(key, name in _REPEATING) for key in _KEYS[cap])
+    return any(imgui.is_key_pressed(key, cap in _REPEATING) for key in _KEYS[cap])
 
 
 def _or_just_released(held: bool, keys: tuple[imgui.Key, ...]) -> bool:

@@ -9,8 +9,9 @@ from imgui_bundle import imgui
 
 from app import keyboard, overlays, picture, sidebar, statusbar, theme
 from app.commands import Context, Request
-from app.geometry import Size, place
+from app.geometry import Size
 from app.layout import Layout, lay_out
+from app.panes import arrange
 from app.readout import Readout
 from app.sidebar import extras
 from app.state import Look, ViewState
@@ -29,8 +30,9 @@ def draw(
     layout = lay_out(*window, scale, state.panel and (readout.grid is not None or bool(readout.captions)))
     size = picture_size(readout, state)
     area = layout.picture
+    panes = arrange(state, area)
     context = Context(
-        state, readout.grid, size, area, readout.loading is not None, bool(readout.messages), len(readout.captions)
+        state, readout.grid, size, panes[0].frame, readout.loading is not None, bool(readout.messages), len(readout.captions)
     )
     context.models, context.model, context.scale = readout.models, readout.model, scale
     context.disparity_range = readout.disparity_range
@@ -39,7 +41,11 @@ def draw(
     size = picture_size(readout, state)
     covered = state.path_field or state.help or state.desk.card is not None
     if readout.grid is not None:
-        picture.draw(area, state, size, scale)
+        panes = arrange(state, area)
+        picture.draw(area, panes, state, size, scale)
+        overlays.names(panes, state, readout)
+        overlays.cross_hairs(panes, state, size)
+        overlays.wipe_handle(area, panes, state)
         overlays.notices(area, state, readout)
         overlays.legend(area, state, readout)
         if not covered:
@@ -52,7 +58,7 @@ def draw(
     if layout.panel is not None:
         panel = extras if readout.captions else sidebar
         panel.draw(layout.panel, context, readout, fonts)
-    statusbar.draw(layout.status, state, readout, place(state.zoom, size, area).scale)
+    statusbar.draw(layout.status, state, readout, panes[0].placement(state.zoom, size).scale)
     overlays.browser(area, context, readout.shelf, fonts)
     overlays.settings(area, context, readout, fonts)
     overlays.palette(area, context)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app.geometry import Point, Rect, Size, pan_by, place, zoom_about
+from app.panes import Pane, under
 from app.state import Look, ViewState
 from app.widgets import FIXED, window
 
@@ -13,9 +14,11 @@ DRAG_SPAN = 360.0
 WHEEL_STEP = 1.2
 
 
-def draw(area: Rect, state: ViewState, picture: Size, scale: float) -> None:
-    """The invisible window over the picture that takes the mouse."""
+def draw(area: Rect, panes: tuple[Pane, ...], state: ViewState, picture: Size, scale: float) -> None:
+    """The invisible window over the pictures that takes the mouse; it acts on the one under it, and so on all of them."""
     delta, hovered = _mouse_in(area)
+    mouse = imgui.get_mouse_pos()
+    area = under(panes, (mouse.x, mouse.y)).frame
     if delta is not None:
         _drag(state, delta, picture, area, scale)
     _hover(state, picture, area, hovered)

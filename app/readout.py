@@ -32,6 +32,17 @@ class ScoreText:
 
 
 @dataclass(frozen=True)
+class Compared:
+    """The picture on screen against its partner, and what is known of scores."""
+
+    there: bool = False  # whether the partner has a picture of this viewpoint
+    score: ScoreText | None = None  # of the picture on screen against its partner
+    mapped: bool = False  # the map of their difference that is looked at has been computed
+    table: tuple[tuple[str, ScoreText | None], ...] = ()  # models and their scores against the captured view
+    views: tuple[ScoreText | None, ...] = ()  # of this model, by number of the captured view
+
+
+@dataclass(frozen=True)
 class Readout:
     """What the panels print: facts of the frame on screen, gathered by the controller."""
 
@@ -56,6 +67,7 @@ class Readout:
     has_disparity: bool = False
     disparity_under_cursor: float | None = None
     captured_here: int | None = None  # number of the captured view at (u, v)
+    compared: Compared = field(default_factory=Compared)
     captions: tuple[Caption, ...] = ()  # of what a Lytro file without raw shows; `kind` then says what it is
     value_under_cursor: float | None = None  # in the unit of the caption
     cached: tuple[Point, ...] = ()  # viewpoints in the cache

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
+from app.comparison import Comparison
 from app.desk import Desk
 from app.geometry import Point, Zoom
 from app.looking import Looking
@@ -25,7 +26,7 @@ class Look(Enum):
     WARPED_BOTTOM_LEFT = "Warped input, bottom left"
     WARPED_TOP_RIGHT = "Warped input, top right"
     WARPED_BOTTOM_RIGHT = "Warped input, bottom right"
-    ERROR = "Error against the captured view"
+    ERROR = "Difference"
     LEAN = "Which input it is most like"
     DISAGREEMENT = "Where the warped inputs disagree"
     SWEEP_MEAN = "Plane sweep, mean"
@@ -149,6 +150,7 @@ class ViewState:
     looking: Looking = field(default_factory=Looking)
     zoom: Zoom = field(default_factory=Zoom)
     gain: float = 8.0  # of the error look
+    comparison: Comparison = field(default_factory=Comparison)
     tail: float = 1.0  # per cent of the disparity values left out at either end of the colour range
     model: str = ""  # for a hand at rest; empty: the one that the program was started with
     foresight: bool = True  # compute views that may be wanted next while nothing else is to be done

@@ -1,13 +1,13 @@
 #version 330 core
-// Absolute difference of a picture and the captured view, times a gain.
+// How a picture differs from its partner.
+#include "difference.glsl"
+
 uniform sampler2D picture;
-uniform sampler2DArray captured;  // of one layer
-uniform float gain;
+uniform sampler2D partner;
 
 layout(location = 0) out vec4 colour;
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 difference = texelFetch(picture, pixel, 0).rgb - texelFetch(captured, ivec3(pixel, 0), 0).rgb;
-    colour = vec4(abs(difference) * gain, 1.0);
+    colour = vec4(shown(texelFetch(picture, pixel, 0).rgb - texelFetch(partner, pixel, 0).rgb), 1.0);
 }

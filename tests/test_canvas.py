@@ -13,6 +13,7 @@ from moving_scene import DISPARITY, SIZE, truth
 
 from app import glsl
 from app.canvas import BACKGROUND, Canvas, Frame, Target
+from app.comparison import Source
 from app.engine import _pixels
 from app.geometry import Rect, Zoom, place
 from app.state import CARRIED_FAR, CARRIED_NEAR, Look
@@ -111,7 +112,7 @@ def test_captured_view_and_synthesis_are_shown_as_they_are(canvas: Canvas) -> No
     captured = random_corners("uint8", seed=3)[1]
     canvas.set_captured(captured)
     give(canvas, truth(0.5, 0.5), None, (0.5, 0.5))
-    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), captured=True))
+    shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5), source=Source.CAPTURED))
     np.testing.assert_allclose(shown, as_float(captured), atol=1e-6)
     shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5)))
     np.testing.assert_allclose(shown, truth(0.5, 0.5), atol=1e-6)

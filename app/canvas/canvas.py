@@ -22,6 +22,7 @@ from app.canvas.passes import Passes
 from app.canvas.placing import shown_size
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
+from app.comparison import Source
 from app.geometry import Placement, Point, Rect, Size
 from app.state import Look
 from lfcore.errors import InputError
@@ -102,6 +103,7 @@ class Canvas:
         """Forget the light field and everything that belongs to it."""
         self._resting_place.use()
         if self._makers is not None:
+            self._makers.compared.release()
             self._makers.textures.release()
             self._makers = None
 
@@ -127,6 +129,14 @@ class Canvas:
         """Take the captured view (H, W, 3), as stored, to be compared with or looked at."""
         self._at_hand.textures.captured.write(np.ascontiguousarray(view))
         self._at_hand.textures.current.clear()
+
+    def set_partner(self, image: FloatArray) -> None:
+        """Take the synthesis of the viewpoint by another model (H, W, 3), to be compared with or looked at."""
+        self._at_hand.compared.set_partner(image)
+
+    def set_map(self, values: FloatArray) -> None:
+        """Take a map (H, W) of how far the picture and its partner are apart; nan where it has no value."""
+        self._at_hand.compared.set_map(values)
 
     def set_exhibit(self, pixels: npt.NDArray[np.generic]) -> None:
         """Take a picture (H, W, 3), uint8, or a map (H, W), float32, that is shown as it is in place of a light field."""
@@ -235,10 +245,11 @@ class Canvas:
         if frame.look.corner is not None:
             return makers.inside.warped(frame.look.corner, frame.viewpoint, tone)
         if frame.look is Look.ERROR:
-            return makers.compared.error(frame.viewpoint, frame.share, frame.gain)
-        if frame.captured:
-            textures = makers.textures
-            return makers.synthesized.copied(textures.picture, textures.captured, 0, tone).texture
+            return makers.compared.difference(
+                frame.viewpoint, frame.share, frame.partner, frame.difference, frame.gain
+            )
+        if frame.source is not Source.SYNTHESIS:
+            return makers.compared.partner(frame.source, frame.viewpoint, tone).texture
         return makers.synthesized.picture(frame.viewpoint, frame.share, tone).texture
 
     @property

@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 
 import moderngl
 
+from app.comparison import Difference, Source
 from app.geometry import Point, Size
 from app.state import Look
 from app.tone import Tone
-
 from lfcore.colormaps import ColourMap
+
 BACKGROUND = (0.055, 0.058, 0.063)
 
 
@@ -21,15 +22,17 @@ class Frame:
     look: Look
     viewpoint: Point
     share: float = 1.0  # how far the newest synthesis has been faded in over what was there before
-    captured: bool = False  # the camera's own view in place of a synthesis
+    source: Source = Source.SYNTHESIS  # which picture is looked at
+    partner: Source = Source.CAPTURED  # which picture it is compared with
+    difference: Difference = Difference.ABSOLUTE
     tone: Tone = field(default_factory=Tone)
     gain: float = 1.0
     disparity_range: tuple[float, float] = (0.0, 1.0)
+    colour_map: ColourMap = ColourMap.VIRIDIS
+    level: float = 0.0  # of the plane sweep, px over the baseline
     dim: float = 1.0
 
 
-    colour_map: ColourMap = ColourMap.VIRIDIS
-    level: float = 0.0  # of the plane sweep, px over the baseline
 @dataclass(frozen=True)
 class Target:
     """What is drawn into: a framebuffer and its (width, height). A window's framebuffer does not know its own size."""

@@ -53,6 +53,18 @@ class Synthesized:
             self._passes.toned("exact.frag", tone).render({"pictures": source}, {"layer": layer})
         return result
 
+    def instant(self, result: Picture, viewpoint: Point, tone: Tone) -> Picture:
+        """The four corner views, warped by the newest disparity, of which there must be one."""
+        textures = self._textures
+        if result.outdated("instant", viewpoint, tone):
+            result.target.use()
+            sampled: Mapping[str, AnyTexture] = {
+                "corner_views": textures.corner_views,
+                "disparity_map": textures.disparity_map,
+            }
+            self._passes.toned("instant.frag", tone).render(sampled, self._carrying(viewpoint))
+        return result
+
     def carry_disparity(self, viewpoint: Point) -> moderngl.Texture:
         """The newest disparity map, carried to the viewpoint: px over the baseline."""
         textures = self._textures
@@ -81,14 +93,11 @@ class Synthesized:
         """The four corner views, blended as they are or warped by the newest disparity."""
         textures = self._textures
         result = textures.before
-        if not result.outdated("corners", viewpoint, warped, tone):
-            return result
-        result.target.use()
-        views: dict[str, AnyTexture] = {"corner_views": textures.corner_views}
         if warped:
-            sampled = views | {"disparity_map": textures.disparity_map}
-            self._passes.toned("instant.frag", tone).render(sampled, self._carrying(viewpoint))
-        else:
+            return self.instant(result, viewpoint, tone)
+        if result.outdated("blend", viewpoint, tone):
+            result.target.use()
+            views = {"corner_views": textures.corner_views}
             self._passes.toned("blend.frag", tone).render(views, {"viewpoint": viewpoint})
         return result
 

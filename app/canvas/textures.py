@@ -41,6 +41,8 @@ class Textures:
     def __init__(self, context: moderngl.Context, corners: npt.NDArray[np.generic], picture_type: str) -> None:
         height, width = corners.shape[1:3]
         stored = TEXTURE_TYPES[corners.dtype.name]
+        self.context = context
+        self.picture_type = picture_type
         self.size: Size = (width, height)
         self.corner_views = context.texture_array(
             (width, height, len(CORNERS)), 3, np.ascontiguousarray(corners).tobytes(), alignment=1, dtype=stored
@@ -61,10 +63,10 @@ class Textures:
         self.picture = Picture(context, self.size, picture_type, self)
         self.sheet = Picture(context, (2 * width, 2 * height), picture_type, self)
         self.precise = Picture(context, self.size, "f4", self)
-        self.made = 0  # how often a target was made
-        self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
         self.inner = Picture(context, self.size, picture_type, self)
         self.deviation = Picture(context, self.size, "f4", self, components=1)
+        self.made = 0  # how often a target was made
+        self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
 
     def outdated(self, target: object, *made_for: object) -> bool:
         """Whether the target was last made for something else; it counts as made for this from now on."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from app.commands import around, looking, moving, program, tabs, zooming
+from app.commands import around, comparing, looking, moving, program, tabs, zooming
 from app.commands.kinds import (
+    COMPARING,
     LOOKING,
     MOVING,
     PROGRAM,
@@ -21,6 +22,7 @@ from app.commands.moving import NUDGE
 
 __all__ = [
     "COMMANDS",
+    "COMPARING",
     "GESTURES",
     "LOOKING",
     "MOVING",
@@ -42,6 +44,7 @@ COMMANDS: dict[str, Command] = {
     **looking.COMMANDS,
     **moving.COMMANDS,
     **zooming.COMMANDS,
+    **comparing.COMMANDS,
     **tabs.COMMANDS,
     **around.COMMANDS,
     **program.COMMANDS,

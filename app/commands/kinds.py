@@ -15,6 +15,9 @@ from app.state import Grid, ViewState
 LOOKING, MOVING, ZOOMING, PROGRAM = "Ways of looking", "Viewpoint", "Picture", "Program"
 
 
+COMPARING = "Comparing"
+
+
 class Action(Enum):
     """What the panels ask of the program, beyond the view state."""
 
@@ -91,13 +94,14 @@ Run = Callable[[Context], None]
 @dataclass(frozen=True)
 class Command:
     """One thing to do: its keys as on the keyboard's caps (with Ctrl+, Shift+ or Ctrl+Shift+ before them), what it does in
-    words, the group of the F1 page in which it stands, and how it is done."""
+    words, the group of the F1 page in which it stands, how it is done, and what is done when the key comes up again."""
 
     keys: tuple[str, ...]
     text: str
     group: str
     run: Run
     needs: Needs = Needs.LIGHT_FIELD
+    released: Run | None = None
 
     @property
     def tooltip(self) -> str:

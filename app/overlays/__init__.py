@@ -2,6 +2,7 @@
 
 from app.overlays.browser import browser
 from app.overlays.cards import loading, messages, path_field
+from app.overlays.comparison import cross_hairs, names, wipe_handle
 from app.overlays.key_page import key_page
 from app.overlays.labels import missing, notices
 from app.overlays.legend import legend
@@ -11,14 +12,17 @@ from app.overlays.start import start
 
 __all__ = [
     "browser",
+    "cross_hairs",
     "key_page",
     "legend",
     "loading",
     "messages",
     "missing",
+    "names",
     "notices",
     "palette",
     "path_field",
     "settings",
     "start",
+    "wipe_handle",
 ]

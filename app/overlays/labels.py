@@ -6,7 +6,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
 from app.commands import Context
+from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement
 from app.geometry import Rect
+from app.overlays import comparison
 from app.readout import Readout
 from app.state import Look, Step, ViewState
 from app.widgets import PASSIVE, button, card, em, packed, wrapped
@@ -16,10 +18,14 @@ from lfcore.lightfield import is_extrapolated
 def notices(area: Rect, state: ViewState, readout: Readout) -> None:
     """Short labels at the top of the picture: what is looked at, and whether it is extrapolated."""
     labels: list[tuple[str, ImVec4]] = []
-    if readout.step is Step.CAPTURED:
+    if state.comparison.flipped:
+        labels.append((comparison.partner_name(state, readout).capitalize(), theme.GOOD))
+    elif state.comparison.arrangement is not Arrangement.ALONE:
+        pass  # each picture has its own name
+    elif readout.step is Step.CAPTURED:
         labels.append(("Captured view", theme.GOOD))
     elif state.look is not Look.SYNTHESIS:
-        labels.append((state.look.value, theme.TEXT))
+        labels.append((comparison.own_name(state, readout), theme.TEXT))
     if is_extrapolated(state.u, state.v):
         labels.append(("Extrapolated", theme.WARNING))
     if state.captured and state.look is Look.SYNTHESIS and readout.captured_here is None:
@@ -44,13 +50,27 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
 def missing(area: Rect, context: Context, readout: Readout) -> None:
     """Why the chosen look has nothing to show, and what to do."""
     look = context.state.look
-    if look is Look.ERROR and readout.captured_here is None:
-        with card("missing", area, (0.5, 0.5), 24 * em()):
-            wrapped("No captured view at this viewpoint")
-            wrapped("The error is measured against the camera's own views, which are the dots of the pad.", theme.TEXT_SOFT)
-            button("Go to the nearest", "nearest", context)
+    if look is Look.ERROR and not readout.compared.there:
+        _no_partner(area, context, readout)
+    elif look is Look.ERROR and context.state.comparison.difference.measured and not readout.compared.mapped:
+        with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
+            wrapped("The map comes with the finished picture")
     elif look.needs_disparity and not readout.has_disparity:
         with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
             wrapped("No disparity yet")
             why = "It comes with the first synthesis." if readout.busy else f"The model {readout.model} has given none."
             wrapped(why, theme.TEXT_SOFT)
+
+
+def _no_partner(area: Rect, context: Context, readout: Readout) -> None:
+    """Why there is no difference to see."""
+    partner = context.state.comparison.partner
+    if partner == CAPTURED_VIEW:
+        with card("missing", area, (0.5, 0.5), 24 * em()):
+            wrapped("No captured view at this viewpoint")
+            wrapped("The error is measured against the camera's own views, which are the dots of the pad.", theme.TEXT_SOFT)
+            button("Go to the nearest", "nearest", context)
+        return
+    with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
+        wrapped("No disparity yet" if partner == INSTANT else f"No picture by {partner} yet")
+        wrapped("It is synthesized when the hand rests.", theme.TEXT_SOFT)
