@@ -31,7 +31,7 @@ _KEYS: dict[str, tuple[imgui.Key, ...]] = {
 # Typed with different keys on different keyboards, so they are taken as characters.
 _CHARACTERS = frozenset("?+=-,./[]")
 _WHILE_TYPING = frozenset(("Esc", "F1"))
-_REPEATING = frozenset(("Left", "Right", "Up", "Down"))
+_REPEATING = frozenset(("Left", "Right", "Up", "Down", "PgUp", "PgDn"))
 
 
 def run_pressed(context: commands.Context) -> None:

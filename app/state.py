@@ -160,6 +160,7 @@ class ViewState:
     path_field: bool = False
     path_text: str = ""
     cursor: Point | None = None  # in picture pixels, None outside
+    inspector: bool = False
     desk: Desk = field(default_factory=Desk)  # what lies around the picture
     exhibit: int = 0  # which picture or map of a Lytro file without raw is shown
 

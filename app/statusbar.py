@@ -75,7 +75,9 @@ def _step(state: ViewState, readout: Readout, x: float, y: float) -> float:
     middle = ImVec2(corner.x + x + radius, corner.y + y + em() / 2)
     imgui.get_window_draw_list().add_circle_filled(middle, radius, packed(STEP_COLOURS[step]))
     start = x + 2 * radius + em() * 0.5
-    _put(_Part(words, f"The step on screen: {STEP_MEANING[step]}.", theme.TEXT), start, y)
+    stages = ", ".join(f"{name} {milliseconds(1e3 * seconds)}" for name, seconds in readout.timings if name != "total")
+    hint = f"The step on screen: {STEP_MEANING[step]}." + (f"  Newest synthesis: {stages}." if stages else "")
+    _put(_Part(words, hint, theme.TEXT), start, y)
     return start + imgui.calc_text_size(words).x
 
 

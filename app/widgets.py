@@ -196,7 +196,8 @@ def _choice(label: str, command: str, selected: bool, context: commands.Context,
     brush.add_text(ImVec2(corner.x + pad, y), packed(theme.TEXT), label)
     key = commands.COMMANDS[command].keys[0]
     x = end.x - pad - imgui.calc_text_size(key).x
-    brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
+    if x - corner.x - pad > imgui.calc_text_size(label).x:  # the tooltip tells it in any case
+        brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
 
 
 def switch(label: str, command: str, on: bool, context: commands.Context) -> None:
@@ -231,13 +232,13 @@ def slider(label: str, value: float, limits: tuple[float, float], shown: str, hi
     imgui.same_line(4.5 * em())
     value_width = 3.4 * em()
     imgui.set_next_item_width(imgui.get_content_region_avail().x - value_width)
-    _, value = imgui.slider_float(f"##{label}", value, *limits, "", flags | imgui.SliderFlags_.always_clamp.value)
+    changed, moved = imgui.slider_float(f"##{label}", value, *limits, "", flags | imgui.SliderFlags_.always_clamp.value)
     tooltip(hint)
     imgui.same_line()
     right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
     imgui.set_cursor_pos_x(right - imgui.calc_text_size(shown).x)
     text(shown)
-    return value
+    return moved if changed else value  # not as imgui has rounded it
 
 
 def packed(colour: ImVec4) -> int:

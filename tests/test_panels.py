@@ -16,7 +16,6 @@ from app.layout import Layout, lay_out
 from app.picture import DRAG_SPAN
 from app.readout import Readout, ScoreText
 from app.state import Grid, Look, Step, Tab, ViewState
-from app.tone import Curve
 
 GRID = Grid(rows=8, columns=8, width=541, height=376)
 OPEN = Readout(model="full", grid=GRID, name="Meadow", kind="folder of views", source="/tmp/Meadow", cache_limit=2**20)
@@ -157,7 +156,7 @@ def test_ticking_the_boxes_changes_the_state(screen: Screen) -> None:
     x, y = screen.find_in_panel(lambda: screen.state.captured, "left")
     screen.click(x, y)
     assert not screen.state.captured
-    screen.find_in_panel(lambda: screen.state.looking.tone.curve is Curve.AUTHORS, "left")
+    screen.find_in_panel(lambda: screen.state.inspector)
 
 
 def test_dragging_the_picture_turns_the_scene_by_hand(screen: Screen) -> None:

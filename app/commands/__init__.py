@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from app.commands import around, comparing, looking, moving, program, tabs, zooming
+from app.commands import around, comparing, inside, looking, moving, program, tabs, tones, zooming
 from app.commands.kinds import (
     COMPARING,
+    INSIDE,
     LOOKING,
     MOVING,
     PROGRAM,
+    TONES,
     ZOOMING,
     Action,
     Ask,
@@ -24,10 +26,12 @@ __all__ = [
     "COMMANDS",
     "COMPARING",
     "GESTURES",
+    "INSIDE",
     "LOOKING",
     "MOVING",
     "NUDGE",
     "PROGRAM",
+    "TONES",
     "ZOOMING",
     "Action",
     "Ask",
@@ -42,6 +46,8 @@ __all__ = [
 
 COMMANDS: dict[str, Command] = {
     **looking.COMMANDS,
+    **inside.COMMANDS,
+    **tones.COMMANDS,
     **moving.COMMANDS,
     **zooming.COMMANDS,
     **comparing.COMMANDS,

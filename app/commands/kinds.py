@@ -13,9 +13,12 @@ from app.state import Grid, ViewState
 
 # Groups of the F1 page.
 LOOKING, MOVING, ZOOMING, PROGRAM = "Ways of looking", "Viewpoint", "Picture", "Program"
+INSIDE, TONES = "Inside the synthesis", "Tone and colours"
 
 
 COMPARING = "Comparing"
+
+
 
 
 class Action(Enum):
@@ -77,6 +80,7 @@ class Context:
     exhibits: int = 0
     models: tuple[str, ...] = ()  # to choose from
     model: str = ""
+    disparity_range: tuple[float, float] | None = None  # of the colours, px over the baseline
     scale: float = 1.0  # of the interface
     requests: list[Request] = field(default_factory=list)
 
