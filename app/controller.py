@@ -20,6 +20,7 @@ from app.comparison import CAPTURED_VIEW, Source
 from app.desk import Card, Folder
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
+from app.exports import Exports, take_plan
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
@@ -27,7 +28,9 @@ from app.readout import Compared, Readout
 from app.scoreboard import Scoreboard
 from app.state import CARRIED_NEAR, Grid, Look, Step, Tab, ViewState, carried_share
 from lfcore.cache import rounded
+from lfcore.errors import LfviewError
 from lfcore.lightfield import LightField
+from lfcore.sweep_plan import is_plan_file
 
 REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
 FADE_SECONDS = 0.1
@@ -70,6 +73,7 @@ class Controller:
             engine.know(name, choice.make)
         self.comparing = Comparing(engine, wake)
         self._scoreboard = Scoreboard(engine, self._models)
+        self.exports = Exports(self._models, wake, self._hand_waits)
         self._grid: Grid | None = None
         self._next: Answer | None = None  # has come while the one before is still being faded in
         self._shown: Point | None = None  # viewpoint at the last tick
@@ -86,8 +90,14 @@ class Controller:
     # What the person asks for.
 
     def open(self, path: Path) -> None:
-        """Begin to open a light field; one that is still being opened is given up, the one on screen stays until then."""
-        self._loading.begin(path)
+        """Begin to open a light field; one that is still being opened is given up, the one on screen stays until then.
+
+        A saved sweep is taken into the tab Export.
+        """
+        if is_plan_file(path):
+            self._take_sweep(path)
+        else:
+            self._loading.begin(path)
 
     def cancel_open(self) -> None:
         """Give up the light field that is being opened."""
@@ -125,6 +135,7 @@ class Controller:
         """End the threads, waiting a little for work that cannot be broken off at once."""
         self._loading.stop(STOP_SECONDS)
         self._asking.stop(STOP_SECONDS)
+        self.exports.stop(STOP_SECONDS)
         self.comparing.stop()
 
     # Once a frame.
@@ -139,6 +150,7 @@ class Controller:
         self._collect()
         if self.light_field is None:
             return
+        self._play(now)
         if self._shown != self.viewpoint:
             self._follow(self.light_field)
         if self._resting and self.state.hand is not None:
@@ -183,6 +195,8 @@ class Controller:
             return 0.0
         if self.light_field is None:
             return None
+        if self.state.export.playing:
+            return self.state.export.next_stop_in(self._now) or 0.0
         if not self._resting:
             return max(self._moved_at + REST_SECONDS - self._now, 0.0) + 1e-3
         if not self._quiet and self._has_idle_work:
@@ -246,6 +260,7 @@ class Controller:
             compared=self._compared(),
             captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
             value_under_cursor=self._value_under_cursor(),
+            exports=self.exports.statuses,
             cached=tuple(self._cached),
             cache_bytes=self._engine.cache.bytes_used,
             cache_limit=self._engine.cache.limit_bytes,
@@ -253,6 +268,29 @@ class Controller:
         )
 
     # Inside.
+
+    def _take_sweep(self, path: Path) -> None:
+        try:
+            take_plan(path, self.state.export)
+        except LfviewError as error:
+            self.say(str(error))
+            return
+        self.state.tab = Tab.EXPORT
+        self.state.panel = True
+
+    def _play(self, now: float) -> None:
+        """Move the viewpoint along the path that is played; a drag stops it."""
+        choices = self.state.export
+        if self.state.dragging:
+            choices.playing = False
+        stop = choices.stop_at(now)
+        if stop is not None:
+            self.state.move_to(stop.u, stop.v)
+
+    def _hand_waits(self) -> bool:
+        """Whether the person waits for a view, which comes before exports."""
+        wish = self._asking.wish
+        return wish is not None and wish.task in FOR_NOW and self._asking.busy
 
     def _change_model(self, name: str) -> None:
         """Another model for a hand at rest. What is on screen stays until its first picture is there."""
@@ -322,6 +360,7 @@ class Controller:
         if light_field is not None:
             size = (light_field.rows, light_field.columns, light_field.width, light_field.height)
             self._grid = Grid(*size, light_field.dark)
+            self.state.export.suggest(light_field)
             self._count(light_field)
         else:
             self._scoreboard.refresh(None, None)
@@ -453,7 +492,7 @@ class Controller:
         stored = engine.stored_position(light_field)
         if stored is not None:
             return Wish(Task.FETCH, stored)
-        if not self._quiet or self._grid is None:
+        if not self._quiet or self._grid is None or self.exports.busy:
             return None
         missing = self._scoreboard.missing_model(light_field, self.viewpoint) if self._wants_table else None
         if missing is not None:

@@ -57,6 +57,15 @@ def place(zoom: Zoom, picture: Size, area: Rect) -> Placement:
     return Placement(scale, (round(origin_x), round(origin_y)))
 
 
+def visible(placement: Placement, picture: Size, area: Rect) -> Rect:
+    """The part of the area that a picture of that size covers."""
+    left, top = placement.to_window((0, 0))
+    right, bottom = placement.to_window(picture)
+    left, top = max(left, area.x), max(top, area.y)
+    width, height = min(right, area.x + area.width) - left, min(bottom, area.y + area.height) - top
+    return Rect(left, top, max(width, 0), max(height, 0))
+
+
 def fit_scale(picture: Size, area: Rect) -> float:
     """The largest scale at which the whole picture lies inside the area."""
     return max(min(area.width / picture[0], area.height / picture[1]), 1e-3)

@@ -20,8 +20,9 @@ from app.controller import Controller
 from app.desk import Placed
 from app.engine import Answer
 from app.exhibits import Exhibit
+from app.export_requests import CancelExport, ExportAction, ExportRequest
 from app.gallery import Seen
-from app.geometry import Placement, Rect, place
+from app.geometry import Placement, Rect, place, visible
 from app.layout import Layout
 from app.panes import arrange
 from app.settings import Theme
@@ -58,6 +59,7 @@ class Interface:
         self._exhibit: Exhibit | None = None  # likewise
         self._timer = self._canvas.timer()
         self._timed = False  # a picture was made in the last frame
+        self._saving = False  # the picture of this frame is to be saved
         self._picture_ms: float | None = None
         imgui.backends.opengl3_init(GLSL_VERSION)
 
@@ -95,6 +97,8 @@ class Interface:
             self._draw_picture(target, layout, pixels)
         elif self._exhibit is not None:
             self._draw_exhibit(self._exhibit, target, layout, pixels)
+        if self._saving:
+            self._save_picture(target, layout, pixels)
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
@@ -124,6 +128,8 @@ class Interface:
             controller.dismiss()
         elif request is Action.QUIT:
             self.closing = True
+        elif isinstance(request, (ExportAction, CancelExport)):
+            self._export(request)
         else:
             self.surroundings.fulfil(request)
 
@@ -138,6 +144,36 @@ class Interface:
         if seen.glance is None or seen.glance.picture is None:
             return None
         return self._atlas.place(seen.number, seen.glance.picture)
+
+    def _export(self, request: ExportRequest) -> None:
+        controller = self.controller
+        if request is ExportAction.SAVE_PICTURE:
+            self._saving = True
+            return
+        model = controller.readout(None).model
+        try:
+            controller.exports.fulfil(request, controller.state.export, controller.light_field, model)
+        except LfviewError as error:
+            controller.say(str(error))
+
+    def _save_picture(self, target: Target, layout: Layout, pixels: float) -> None:
+        """Hand what is drawn of the picture, without what lies over it, to the export queue."""
+        self._saving = False
+        controller = self.controller
+        state = controller.state
+        size = panels.picture_size(controller.readout(None), state)
+        seen = _scaled(visible(place(state.zoom, size, layout.picture), size, layout.picture), pixels)
+        left, top, width, height = (round(value) for value in (seen.x, seen.y, seen.width, seen.height))
+        if min(width, height) < 1:
+            return
+        corner = (left, target.size[1] - top - height)
+        shown = target.framebuffer.read((*corner, width, height), components=3, alignment=1)
+        picture = np.frombuffer(shown, np.uint8).reshape(height, width, 3)[::-1]
+        name = f"{controller.name} {state.look.value.lower()} u{state.u:.2f} v{state.v:.2f}".replace("/", " ")
+        try:
+            controller.exports.save_picture(picture, state.export, name)
+        except LfviewError as error:
+            controller.say(str(error))
 
     def _synchronise(self) -> None:
         """Hand to the canvas what it has not yet taken."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from app.desk import Shelf
+from app.exporting import Status
 from app.geometry import Point
 from app.state import Grid, Step
 
@@ -75,3 +76,4 @@ class Readout:
     cache_limit: int = 0
     cache_hits: int = 0
     shelf: Shelf = field(default_factory=Shelf)  # files to choose from
+    exports: tuple[Status, ...] = ()  # in the order in which they came

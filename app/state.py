@@ -8,6 +8,7 @@ from enum import Enum
 
 from app.comparison import Comparison
 from app.desk import Desk
+from app.export_choices import ExportChoices
 from app.geometry import Point, Zoom
 from app.looking import Looking
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
@@ -163,6 +164,7 @@ class ViewState:
     inspector: bool = False
     desk: Desk = field(default_factory=Desk)  # what lies around the picture
     exhibit: int = 0  # which picture or map of a Lytro file without raw is shown
+    export: ExportChoices = field(default_factory=ExportChoices)
 
     def move_to(self, u: float, v: float) -> None:
         """Go to a viewpoint, clamped to the extrapolation limit."""

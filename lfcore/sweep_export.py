@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -15,25 +13,10 @@ from lfcore.frame_files import check_frames_target, write_numbered
 from lfcore.lightfield import FloatArray
 from lfcore.sweep_frames import SweepFrames
 from lfcore.sweep_plan import Layer, SweepPlan
+from lfcore.sweep_target import Kind, Target
 from lfcore.video import VIDEO_EXTENSIONS, check_video_target, write_video
 
 _T = TypeVar("_T")
-
-
-class Kind(Enum):
-    """What a sweep is written as."""
-
-    VIDEO = "one file: .mp4 (H.264), .webm (VP9), .webp or .gif"
-    PNG = "a folder of PNG pictures with 8 bits"
-    EXR = "a folder of EXR files: the image as half floats, disparity and error as floats"
-
-
-@dataclass(frozen=True)
-class Target:
-    """Where a sweep goes: a file for a video, else a folder."""
-
-    path: Path
-    kind: Kind
 
 
 def never() -> bool:

@@ -29,14 +29,16 @@ ByteArray = npt.NDArray[np.uint8]
 Synthesize = Callable[[float, float], "Synthesis"]
 
 MAX_SIDE = 16_383  # px of a frame: the most that a WebP, and about what H.264, can hold
+_CACHE_BYTES = 256 * 2**20  # of past syntheses: a way back meets those of the way there
 _RANGE_STRIDE = 2  # every second row and column tell a range well enough
 _ENOUGH_CAPTURED = 5  # views a side: fewer than these leave ghosts when they are summed
 _SUMMED = 9  # synthesized views a side, where the captured ones are too few
 
 
-def from_cache_or(light_field: LightField, synthesizer: Synthesizer, cache: SynthesisCache) -> Synthesize:
-    """Syntheses of this light field by this synthesizer; what was asked before comes from the cache."""
+def remembering(light_field: LightField, synthesizer: Synthesizer) -> Synthesize:
+    """Syntheses of this light field, which the synthesizer takes over; what was asked before comes from a cache."""
     synthesizer.set_light_field(light_field)
+    cache = SynthesisCache(_CACHE_BYTES)
 
     def synthesize(u: float, v: float) -> Synthesis:
         key = cache_key(light_field, synthesizer, u, v)

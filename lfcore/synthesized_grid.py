@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,36 +15,13 @@ from lfcore.formats.eslf import LENSLET
 from lfcore.formats.images import MAX_BYTES
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import to_uint8
+from lfcore.quilt import MAX_VIEWS, Quilt, quilt_path
 from lfcore.refocus import shifted
 
 ByteArray = npt.NDArray[np.uint8]
 View = Callable[[float, float], FloatArray]
 
-MAX_VIEWS = 64  # along one side of a grid
 MAX_QUILT_SIDE = 32_768  # px
-_QUILT_NAME = re.compile(r"_qs\d+x\d+a[\d.]+$")
-
-
-@dataclass(frozen=True)
-class Quilt:
-    """A quilt: `columns` x `rows` views from left to right along u, at `v`; `focus` (px of disparity over the baseline) is
-    what lies in the plane of the screen."""
-
-    columns: int
-    rows: int
-    v: float = 0.5
-    focus: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (1 <= self.columns <= MAX_VIEWS and 1 <= self.rows <= MAX_VIEWS and self.columns * self.rows >= 2):
-            raise InputError(
-                f"A quilt of {self.columns} x {self.rows} views was asked for; give from 1 x 2 to {MAX_VIEWS} x {MAX_VIEWS}."
-            )
-
-    def place(self, number: int) -> tuple[int, int]:
-        """(row from the top, column) of view `number`, from 0 at the left of the scene: the bottom left comes first."""
-        up, column = divmod(number, self.columns)
-        return self.rows - 1 - up, column
 
 
 def never() -> bool:
@@ -123,13 +98,6 @@ def write_eslf(
     # A row of microlenses at a time, so that writing can be broken off too.
     bands = (picture[top : top + LENSLET] for top in range(0, height, LENSLET))
     write_rows(path, (height, width), _until(bands, cancelled))
-
-
-def quilt_path(path: Path, quilt: Quilt, light_field: LightField) -> Path:
-    """The file's name with the ending by which players of quilts know columns, rows and aspect: name_qs8x6a1.439.png."""
-    aspect = f"{light_field.width / light_field.height:.4g}"
-    stem = path.stem if path.suffix.lower() == ".png" else path.name
-    return path.with_name(f"{_QUILT_NAME.sub('', stem)}_qs{quilt.columns}x{quilt.rows}a{aspect}.png")
 
 
 def check_quilt_target(path: str | os.PathLike[str], quilt: Quilt, light_field: LightField) -> Path:

@@ -10,12 +10,11 @@ import pytest
 
 from app.__main__ import main
 from app.cli.sweep import LAYER_NAMES, PATH_NAMES
-from lfcore.cache import SynthesisCache
 from lfcore.export import write_picture
 from lfcore.formats import open_light_field
 from lfcore.key_frames import Stop
 from lfcore.sweep import PATHS
-from lfcore.sweep_frames import SweepFrames, from_cache_or
+from lfcore.sweep_frames import SweepFrames, remembering
 from lfcore.sweep_plan import KeyFramePath, Layer, ShapePath, SweepPlan, load_plan, save_plan
 from lfcore.synthesizer import MeanSynthesizer
 from tests.moving_scene import light_field
@@ -56,7 +55,7 @@ def test_a_saved_plan_gives_the_frames_of_the_library(scene: Path, tmp_path: Pat
     save_plan(tmp_path / "plan.json", plan)
     assert sweep(scene, "--path", tmp_path / "plan.json", "--out", tmp_path / "f", "--as", "png") == 0
     opened = open_light_field(scene)
-    expected = SweepFrames(plan, opened, from_cache_or(opened, MeanSynthesizer(), SynthesisCache()))
+    expected = SweepFrames(plan, opened, remembering(opened, MeanSynthesizer()))
     found = frames(tmp_path / "f")
     assert len(found) == len(expected) == plan.frames
     assert all(np.array_equal(frame, expected.picture(index)) for index, frame in enumerate(found))

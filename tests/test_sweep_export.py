@@ -14,9 +14,10 @@ import pytest
 from lfcore.errors import Cancelled, InputError, OutputError
 from lfcore.key_frames import Stop
 from lfcore.metrics import to_uint8
-from lfcore.sweep_export import Kind, Target, check_target, export_sweep
+from lfcore.sweep_export import check_target, export_sweep
 from lfcore.sweep_frames import SweepFrames
 from lfcore.sweep_plan import KeyFramePath, Layer, SweepPlan
+from lfcore.sweep_target import Kind, Target
 from tests.moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
 LINE = KeyFramePath((Stop(0, 0.5), Stop(1, 0.5)))

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from lfcore import colormaps
-from lfcore.cache import SynthesisCache
 from lfcore.display_tone import brightened
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
 from lfcore.metrics import to_uint8
 from lfcore.sweep import horizontal
-from lfcore.sweep_frames import SweepFrames, from_cache_or
+from lfcore.sweep_frames import SweepFrames, remembering
 from lfcore.sweep_plan import KeyFramePath, Layer, ShapePath, SweepPlan
 from lfcore.synthesizer import MeanSynthesizer, Synthesis
 from tests.moving_scene import DISPARITY, SIZE, TruthSynthesizer, light_field, truth
@@ -24,7 +23,7 @@ HEIGHT, WIDTH = SIZE
 def frames_of(plan: SweepPlan, views: int = 3) -> tuple[SweepFrames, TruthSynthesizer]:
     synthesizer = TruthSynthesizer()
     scene = light_field(views, views)
-    return SweepFrames(plan, scene, from_cache_or(scene, synthesizer, SynthesisCache())), synthesizer
+    return SweepFrames(plan, scene, remembering(scene, synthesizer)), synthesizer
 
 
 def test_image_frames_are_the_syntheses_made_one_by_one() -> None:
@@ -67,7 +66,7 @@ def test_error_frames_are_taken_where_the_truth_is_known() -> None:
     scene = light_field(5, 5)
     mean = MeanSynthesizer()
     plan = SweepPlan(KeyFramePath((Stop(0.1, 0.3), Stop(0.4, 0.3))), 2, layer=Layer.ERROR, gain=4)
-    frames = SweepFrames(plan, scene, from_cache_or(scene, mean, SynthesisCache()))
+    frames = SweepFrames(plan, scene, remembering(scene, mean))
     assert [(stop.u, stop.v) for stop in frames.stops] == [(0, 0.25), (0.5, 0.25)]
     expected = np.abs(mean.synthesize(0, 0).image - scene.view(1, 2)).mean(2)
     assert frames.numbers(1)[..., 0] == pytest.approx(expected, abs=1e-3)
@@ -132,9 +131,7 @@ def test_refocused_at_its_disparity_the_scene_stays_sharp(views: int) -> None:
 
 def test_a_model_without_disparity_says_so() -> None:
     scene = light_field()
-    frames = SweepFrames(
-        SweepPlan(LINE, layer=Layer.DISPARITY), scene, from_cache_or(scene, MeanSynthesizer(), SynthesisCache())
-    )
+    frames = SweepFrames(SweepPlan(LINE, layer=Layer.DISPARITY), scene, remembering(scene, MeanSynthesizer()))
     with pytest.raises(InputError, match="mean has no disparity"):
         frames.picture(0)
 

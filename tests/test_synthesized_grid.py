@@ -14,11 +14,10 @@ from lfcore.export import write_picture, write_rows
 from lfcore.formats import open_light_field
 from lfcore.lightfield import FloatArray
 from lfcore.metrics import to_uint8
+from lfcore.quilt import Quilt, quilt_path
 from lfcore.synthesized_grid import (
-    Quilt,
     check_grid_target,
     check_quilt_target,
-    quilt_path,
     write_eslf,
     write_quilt,
     write_views,

@@ -14,8 +14,8 @@ from lfcore.errors import InputError
 
 if TYPE_CHECKING:
     from lfcore.lightfield import LightField
-    from lfcore.sweep_export import Target
     from lfcore.sweep_plan import SweepPlan, ViewPath
+    from lfcore.sweep_target import Target
 
 PATH_NAMES = ("circle", "horizontal", "vertical", "lawnmower", "spiral")
 LAYER_NAMES = ("image", "disparity", "error", "image+captured", "image+disparity")
@@ -107,15 +107,14 @@ def run(options: argparse.Namespace) -> int:
     if options.save_path:
         check_file(options.save_path, (".json",))
 
-    from lfcore.cache import SynthesisCache
-    from lfcore.sweep_frames import SweepFrames, from_cache_or
+    from lfcore.sweep_frames import SweepFrames, remembering
     from lfcore.synthesizer import make_synthesizer
 
     synthesizer = make_synthesizer(options.model)
     light_field = open_with_progress(options.path, options.views)
     plan = _sized(plan, options, light_field)
     start = time.perf_counter()
-    frames = SweepFrames(plan, light_field, from_cache_or(light_field, synthesizer, SynthesisCache()))
+    frames = SweepFrames(plan, light_field, remembering(light_field, synthesizer))
     with Progress("synthesizing", plan.frames, "frames") as bar:
         export_sweep(frames, target, lambda count: bar.reach(count / plan.frames))
     if options.save_path:
@@ -172,7 +171,7 @@ def _path(name: str, options: argparse.Namespace) -> ViewPath:
 
 
 def _target(options: argparse.Namespace) -> Target:
-    from lfcore.sweep_export import Kind, Target
+    from lfcore.sweep_target import Kind, Target
     from lfcore.video import COUNTING_EXTENSIONS
 
     kinds = {None: Kind.VIDEO, "png": Kind.PNG, "exr": Kind.EXR}

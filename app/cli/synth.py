@@ -132,7 +132,8 @@ def _grid(options: argparse.Namespace) -> int:
 
 
 def _quilt(options: argparse.Namespace) -> int:
-    from lfcore.synthesized_grid import Quilt, check_quilt_target, write_quilt
+    from lfcore.quilt import Quilt
+    from lfcore.synthesized_grid import check_quilt_target, write_quilt
 
     columns, rows = options.quilt
     quilt = Quilt(columns, rows, focus=options.focus or 0.0)

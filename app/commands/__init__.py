@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from app.commands import around, comparing, inside, looking, moving, program, tabs, tones, zooming
+from app.commands import around, comparing, exporting, inside, looking, moving, program, tabs, tones, zooming
 from app.commands.kinds import (
     COMPARING,
+    EXPORTING,
     INSIDE,
     LOOKING,
     MOVING,
@@ -25,6 +26,7 @@ from app.commands.moving import NUDGE
 __all__ = [
     "COMMANDS",
     "COMPARING",
+    "EXPORTING",
     "GESTURES",
     "INSIDE",
     "LOOKING",
@@ -52,6 +54,7 @@ COMMANDS: dict[str, Command] = {
     **zooming.COMMANDS,
     **comparing.COMMANDS,
     **tabs.COMMANDS,
+    **exporting.COMMANDS,
     **around.COMMANDS,
     **program.COMMANDS,
 }
@@ -61,6 +64,7 @@ GESTURES: tuple[tuple[str, str, str], ...] = (
     (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
     (ZOOMING, "Wheel", "Zoom about the cursor"),
     (ZOOMING, "Right drag, Space + drag", "Move the picture"),
+    (EXPORTING, "Right click in the pad", "Add or remove a key frame"),
     (PROGRAM, "Drop", "Open a file or folder, or choose from several"),
 )
 

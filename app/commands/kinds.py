@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 
 from app.dialogs import Purpose
+from app.export_requests import ExportRequest
 from app.geometry import Rect, Size
 from app.state import Grid, ViewState
 
@@ -19,6 +20,7 @@ INSIDE, TONES = "Inside the synthesis", "Tone and colours"
 COMPARING = "Comparing"
 
 
+EXPORTING = "Export"
 
 
 class Action(Enum):
@@ -55,7 +57,7 @@ class Browse:
     folder: Path | None
 
 
-Request = Action | OpenPath | Ask | Browse
+Request = Action | OpenPath | Ask | Browse | ExportRequest
 
 
 class Needs(Enum):

@@ -1,11 +1,228 @@
-"""The tab Export: paths and export."""
+"""The tab Export: a path, what its frames show, the file, and the queue of exports."""
 
 from __future__ import annotations
 
+from enum import Enum
+from typing import TypeVar
+
+from imgui_bundle import ImVec2, imgui
+
 from app import theme
 from app.commands import Context
+from app.export_choices import KEY_FRAMES, RADIUS_LIMITS, SHAPES, ExportChoices, Format, Product
+from app.export_requests import CancelExport, ExportAction
+from app.exporting import Phase, Status
+from app.progress import clock
 from app.readout import Readout
+from app.state import Grid
+from app.widgets import button, choice, elided, em, font, heading, number, slider, text, tooltip, wrapped
+from lfcore.key_frames import MAX_FOCUS
+from lfcore.quilt import MAX_VIEWS
+from lfcore.sweep import MAX_FRAMES
+from lfcore.sweep_plan import MAX_FPS, MAX_PLAYS, Layer
+
+_Chosen = TypeVar("_Chosen", bound=Enum)
+
+_LABEL = 4.5  # em, as in app.widgets
+_SIZES = {"25 %": 0.25, "50 %": 0.5, "100 %": 1.0, "150 %": 1.5, "200 %": 2.0, "300 %": 3.0}
+_LAYERS = {
+    "Image": Layer.IMAGE,
+    "Disparity": Layer.DISPARITY,
+    "Error": Layer.ERROR,
+    "Image | captured": Layer.BESIDE_CAPTURED,
+    "Image | disparity": Layer.BESIDE_DISPARITY,
+}
+_ESLF_SIDE = 14  # views that an ESLF holds along each side
+_SAME_MODEL = "as in the window"
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     """The whole tab."""
+    choices = context.state.export
+    imgui.dummy(ImVec2(0, 0))
+    choices.product = _chosen("What", choices.product, Product, "What is exported")
+    if choices.product is Product.SWEEP:
+        _path(context, choices, fonts)
+        _frames(choices, fonts)
+    elif readout.grid is not None:
+        _grid(choices, readout.grid)
+    _file(context, choices, readout, fonts)
+    _queue(context, readout, fonts)
+
+
+def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
+    heading("Path", fonts)
+    choices.shape = choice("Shape", choices.shape, SHAPES, "The way of the viewpoint, at even speed")
+    if choices.shape == KEY_FRAMES:
+        count = len(choices.key_frames)
+        width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+        button(f"Add ({count})", "add key frame", context, width)
+        imgui.same_line()
+        imgui.begin_disabled(not count)
+        button("Remove", "remove key frame", context, width)
+        imgui.end_disabled()
+        _, choices.closed = imgui.checkbox("Back to the first", choices.closed)
+        tooltip("The path closes, so that a video can be looped. In the pad, a right click adds or removes a key frame.")
+    else:
+        hint = "Reach from the middle view; 0.5 is the edge of the corner views"
+        choices.radius = slider("Reach", choices.radius, RADIUS_LIMITS, number(choices.radius, 2), hint)
+    choices.frames = _whole("Frames", choices.frames, (1, MAX_FRAMES), "Number of frames")
+    choices.fps = _decimal("Per second", choices.fps, (0.1, MAX_FPS), "%.4g", "Frames per second")
+    _, choices.refocus = imgui.checkbox("Refocus", choices.refocus)
+    tooltip("Frames are the mean of the views within an aperture, shifted to the disparity in focus.")
+    if choices.refocus:
+        _focus(choices)
+    half = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+    button("Stop" if choices.playing else "Play", "play path", context, half)
+    imgui.same_line()
+    imgui.begin_disabled(bool(choices.fault))
+    button("Save path", "save path", context, half)
+    imgui.end_disabled()
+
+
+def _focus(choices: ExportChoices) -> None:
+    first, last = choices.focus
+    limits = (-MAX_FOCUS, MAX_FOCUS)
+    if choices.shape == KEY_FRAMES:
+        first = _decimal("Focus", first, limits, "%.1f", "Disparity in focus at the next key frame, px from corner to corner")
+    else:
+        first = _decimal("From", first, limits, "%.1f", "Disparity in focus where the path begins, px from corner to corner")
+        last = _decimal("To", last, limits, "%.1f", "Disparity in focus where the path ends; closed ones go back")
+    choices.focus = (first, last)
+    choices.aperture = slider(
+        "Aperture", choices.aperture, (0.0, 2.0), number(choices.aperture, 2), "Its diameter in baselines"
+    )
+
+
+def _frames(choices: ExportChoices, fonts: theme.Fonts) -> None:
+    heading("Frames", fonts)
+    layers = {layer: name for name, layer in _LAYERS.items()}
+    hint = "What the frames show. Errors are shown at captured views only."
+    choices.layer = _LAYERS[choice("Show", layers[choices.layer], tuple(_LAYERS), hint)]
+    sizes = {f"{100 * choices.scale:.4g} %": choices.scale, **_SIZES}
+    shown = next(name for name, scale in sizes.items() if scale == choices.scale)
+    choices.scale = sizes[choice("Size", shown, tuple(dict.fromkeys((*_SIZES, shown))), "Of the views' own size")]
+    _, choices.labels = imgui.checkbox("Labels", choices.labels)
+    tooltip("Captions with (u, v), and the scales of colours")
+    imgui.same_line(0, em() * 1.2)
+    _, choices.brighten = imgui.checkbox("Brighten", choices.brighten)
+    tooltip("The display tone for dark captures: ^(1/1.5), saturation × 1.5")
+
+
+def _grid(choices: ExportChoices, grid: Grid) -> None:
+    if choices.product is Product.QUILT:
+        choices.columns = _whole("Columns", choices.columns, (1, MAX_VIEWS), "Views in a row of the quilt")
+        choices.rows = _whole("Rows", choices.rows, (2, MAX_VIEWS), "Rows of the quilt")
+        _, choices.refocus = imgui.checkbox("Screen's plane", choices.refocus)
+        tooltip("Shift the views so that a disparity lies in the plane of the screen; else it is 0")
+        if choices.refocus:
+            hint = "The disparity in the plane of the screen, px from corner to corner"
+            plane = _decimal("Focus", choices.focus[0], (-MAX_FOCUS, MAX_FOCUS), "%.1f", hint)
+            choices.focus = (plane, choices.focus[1])
+        width, height = choices.columns * grid.width, choices.rows * grid.height
+        text(f"{width} × {height} px", theme.TEXT_FAINT)
+        return
+    most = _ESLF_SIDE if choices.product is Product.ESLF else MAX_VIEWS
+    choices.side = _whole("Views", min(choices.side, most), (2, most), "Views along each side, from corner to corner")
+
+
+def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: theme.Fonts) -> None:
+    heading("File", fonts)
+    if choices.product is Product.SWEEP:
+        choices.format = _chosen("Kind", choices.format, Format, "Frames go into a folder: PNG to look at, EXR to compute with")
+        if choices.format.counts_plays:
+            choices.plays = _whole("Plays", choices.plays, (0, MAX_PLAYS), "How often it is played; 0: for ever")
+    models = (_SAME_MODEL, *readout.models)
+    model = choice("Model", choices.model or _SAME_MODEL, models, "The model that makes the views; realtime is the fastest")
+    choices.model = "" if model == _SAME_MODEL else model
+    choices.folder = _typed("Folder", choices.folder, "Where it is written")
+    choices.name = _typed("Name", choices.name, "The file's name, without the ending of its kind")
+    fault = choices.fault
+    imgui.begin_disabled(bool(fault))
+    button("Export", "export", context, imgui.get_content_region_avail().x)
+    imgui.end_disabled()
+    with font(fonts.regular, theme.SMALL):
+        if fault:
+            wrapped(fault, theme.WARNING)
+        elif choices.product is Product.SWEEP:
+            text(f"{choices.frames / choices.fps:.1f} s", theme.TEXT_FAINT)
+
+
+def _queue(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
+    if not readout.exports:
+        return
+    heading("Exports", fonts)
+    for status in reversed(readout.exports):
+        imgui.push_id(status.number)
+        with font(fonts.regular, theme.SMALL):
+            _job(context, status)
+        imgui.pop_id()
+    if any(status.phase.over for status in readout.exports):
+        if imgui.button("Clear", ImVec2(imgui.get_content_region_avail().x, 0)):
+            context.requests.append(ExportAction.CLEAR)
+        tooltip("Forget those that are over; files stay")
+
+
+def _job(context: Context, status: Status) -> None:
+    width = imgui.get_content_region_avail().x
+    text(elided(status.target.name, width))
+    tooltip(f"{status.title}\n{status.target}")
+    if status.phase is Phase.DONE:
+        wrapped(f"Written in {clock(status.seconds)}: {status.target}", theme.GOOD)
+    elif status.phase is Phase.FAILED:
+        wrapped(status.message, theme.ERROR)
+    elif status.phase is Phase.CANCELLED:
+        text("Cancelled", theme.TEXT_FAINT)
+    else:
+        imgui.progress_bar(status.done / max(status.total, 1), ImVec2(-1, em() * 0.4), "")
+        text(progress_words(status), theme.TEXT_SOFT)
+        imgui.same_line()
+        cancel = "Cancel"
+        room = imgui.calc_text_size(cancel).x + 2 * imgui.get_style().frame_padding.x
+        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(imgui.get_content_region_avail().x - room, 0))
+        if imgui.small_button(cancel):
+            context.requests.append(CancelExport(status.number))
+        tooltip("Give it up; nothing of it stays")
+
+
+def progress_words(status: Status) -> str:
+    """How far a job is, how fast, and how long it will take."""
+    if status.phase is Phase.WAITING:
+        return "Waiting"
+    words = f"{status.done} of {status.total}"
+    if status.rate is not None and status.seconds_left is not None:
+        words += f", {status.rate:.1f}/s, {clock(status.seconds_left)} left"
+    return words
+
+
+def _chosen(label: str, value: _Chosen, kind: type[_Chosen], hint: str) -> _Chosen:
+    """A list of all members of an enumeration, by their values."""
+    return kind(choice(label, value.value, [each.value for each in kind], hint))
+
+
+def _labelled(label: str) -> None:
+    imgui.align_text_to_frame_padding()
+    text(label, theme.TEXT_SOFT)
+    imgui.same_line(_LABEL * em())
+    imgui.set_next_item_width(imgui.get_content_region_avail().x)
+
+
+def _whole(label: str, value: int, limits: tuple[int, int], hint: str) -> int:
+    _labelled(label)
+    _, value = imgui.input_int(f"##{label}", value)
+    tooltip(hint)
+    return min(max(value, limits[0]), limits[1])
+
+
+def _decimal(label: str, value: float, limits: tuple[float, float], shown: str, hint: str) -> float:
+    _labelled(label)
+    _, value = imgui.input_float(f"##{label}", value, 1.0, 5.0, shown)
+    tooltip(hint)
+    return min(max(value, limits[0]), limits[1])
+
+
+def _typed(label: str, value: str, hint: str) -> str:
+    _labelled(label)
+    _, value = imgui.input_text(f"##{label}", value)
+    tooltip(hint)
+    return value

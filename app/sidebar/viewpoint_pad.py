@@ -5,9 +5,10 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app import theme
+from app.export_choices import KEY_FRAMES, drawn_path
 from app.geometry import Point
 from app.readout import Readout
-from app.state import ViewState
+from app.state import Tab, ViewState
 from app.widgets import em, packed, tooltip
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 
@@ -18,11 +19,14 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     """The pad as a square of `size`; a click or a drag in it moves the viewpoint."""
     corner = imgui.get_cursor_screen_pos()
     imgui.invisible_button("viewpoint pad", ImVec2(size, size))
+    mouse = imgui.get_mouse_pos()
+    u = (mouse.x - corner.x) / size * _SPAN - EXTRAPOLATION_LIMIT
+    v = (mouse.y - corner.y) / size * _SPAN - EXTRAPOLATION_LIMIT
     if imgui.is_item_active() or imgui.is_item_deactivated():  # what moved in the frame of the release counts
-        mouse = imgui.get_mouse_pos()
-        u = (mouse.x - corner.x) / size * _SPAN - EXTRAPOLATION_LIMIT
-        v = (mouse.y - corner.y) / size * _SPAN - EXTRAPOLATION_LIMIT
         state.drag_to(u, v)
+    exporting = state.tab is Tab.EXPORT or state.export.playing
+    if exporting and imgui.is_item_clicked(imgui.MouseButton_.right):
+        state.export.add_or_remove_key_frame(u, v)
     if not imgui.is_item_active():
         tooltip("Click or drag to move the viewpoint. Dots: captured views; blue: in the cache; rim: extrapolated.  (Arrows)")
 
@@ -50,6 +54,13 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
             dark = divmod(index, grid.columns) in grid.dark
             colour = theme.FIELD_ACTIVE if dark else theme.TEXT_SOFT
             brush.add_circle_filled(at(grid.position(index)), radius, packed(colour))
+    if exporting:
+        for stop in drawn_path(state.export):
+            brush.path_line_to(at((stop.u, stop.v)))
+        brush.path_stroke(packed(theme.ACCENT), em() * 0.12)
+        if state.export.shape == KEY_FRAMES:
+            for key in state.export.key_frames:
+                brush.add_circle_filled(at((key.u, key.v)), em() * 0.22, packed(theme.WARNING))
     on_captured = readout.captured_here is not None
     brush.add_circle_filled(here, em() * 0.3, packed(theme.ACCENT))
     brush.add_circle(here, em() * 0.3, packed(theme.TEXT if on_captured else theme.BACKGROUND), 0, em() * 0.1)

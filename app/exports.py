@@ -1,0 +1,90 @@
+"""What the program does about exports: fulfils what the tab asks for, and tells how far the queue is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from app.engine import ModelChoice
+from app.export_choices import ExportChoices
+from app.export_requests import CancelExport, ExportAction, ExportRequest
+from app.exporting import ExportQueue, Status
+from lfcore.errors import InputError
+from lfcore.lightfield import LightField
+from lfcore.sweep_plan import load_plan, save_plan
+
+if TYPE_CHECKING:
+    from lfcore.synthesizer import Synthesizer
+
+
+class Exports:
+    """The export queue and the models that it uses. All methods belong to the main thread; `hand_waits`, which says whether the
+    person waits for a view, and `wake` are called from the queue's."""
+
+    def __init__(self, models: Mapping[str, ModelChoice], wake: Callable[[], None], hand_waits: Callable[[], bool]) -> None:
+        self._models = models
+        self._queue = ExportQueue(wake)
+        self._hand_waits = hand_waits
+        self._made: dict[str, Synthesizer] = {}  # in the queue's thread; the one used last
+
+    @property
+    def statuses(self) -> tuple[Status, ...]:
+        """All jobs, in the order in which they came."""
+        return self._queue.statuses
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being exported."""
+        return self._queue.busy
+
+    def fulfil(self, request: ExportRequest, choices: ExportChoices, light_field: LightField | None, model: str) -> None:
+        """Do what was asked for, but saving a picture. Raises LfviewError where it is impossible as chosen."""
+        if isinstance(request, CancelExport):
+            self._queue.cancel(request.number)
+        elif request is ExportAction.CLEAR:
+            self._queue.clear()
+        elif request is ExportAction.SAVE_PATH:
+            save_plan(plan_file(choices), choices.plan())
+        elif request is ExportAction.EXPORT and light_field is not None:
+            self._begin(choices, light_field, choices.model or model)
+
+    def save_picture(self, pixels: npt.NDArray[np.uint8], choices: ExportChoices, stem: str) -> None:
+        """Write the picture as shown, uint8 (H, W, 3), into the folder of the exports."""
+        from app.export_jobs import picture_job
+
+        self._queue.add(picture_job(pixels, Path(choices.folder).expanduser(), stem))
+
+    def stop(self, timeout: float) -> None:
+        """End the thread; what is not finished is given up."""
+        self._queue.stop(timeout)
+
+    def _begin(self, choices: ExportChoices, light_field: LightField, model: str) -> None:
+        from app.export_jobs import Source, chosen_job
+
+        if model not in self._models:
+            raise InputError(f"The model {model} cannot be used for exports; choose another one.")
+        source = Source(light_field, model, partial(self._synthesizer, model), self._hand_waits)
+        self._queue.add(chosen_job(choices, source))
+
+    def _synthesizer(self, model: str) -> Synthesizer:
+        """The model, loaded; only one is kept."""
+        if model not in self._made:
+            self._made = {model: self._models[model].make()}
+        return self._made[model]
+
+
+def plan_file(choices: ExportChoices) -> Path:
+    """Where the sweep is saved as JSON: beside the export, under its name."""
+    return Path(choices.folder).expanduser() / f"{choices.name}.json"
+
+
+def take_plan(path: Path, choices: ExportChoices) -> None:
+    """Choose what a saved sweep says. Raises InputError where it is none."""
+    plan = load_plan(path)
+    choices.take(plan)
+    choices.name = path.stem

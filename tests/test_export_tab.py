@@ -1,0 +1,187 @@
+"""The tab Export by fed mouse and key events, without any GL; and what the program does about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.controller import Controller
+from app.engine import Engine, ModelChoice
+from app.export_choices import KEY_FRAMES, Product
+from app.export_requests import CancelExport, ExportAction
+from app.exporting import Phase, Status
+from app.sidebar.export import progress_words
+from app.state import Tab
+from lfcore.errors import InputError
+from lfcore.key_frames import Stop
+from lfcore.sweep_plan import ShapePath, SweepPlan, load_plan, save_plan
+from tests.moving_scene import TruthSynthesizer, light_field
+from tests.test_panels import Screen
+from tests.virtual_screen import wait_until
+
+
+@pytest.fixture
+def screen(imgui_context: Any) -> Screen:
+    made = Screen(imgui_context)
+    made.state.export.folder = "/tmp"
+    made.press("Ctrl+E")
+    return made
+
+
+def test_keys_add_and_remove_key_frames_and_play(screen: Screen) -> None:
+    assert screen.state.tab is Tab.EXPORT
+    export = screen.state.export
+    screen.state.move_to(0.25, 0.75)
+    screen.press("K")
+    screen.state.move_to(0.5, 0.5)
+    screen.press("K")
+    assert export.shape == KEY_FRAMES
+    assert [(key.u, key.v) for key in export.key_frames] == [(0.25, 0.75), (0.5, 0.5)]
+    screen.press("Shift+K")
+    assert len(export.key_frames) == 1
+    screen.press("Ctrl+Shift+K")
+    assert export.playing
+    screen.press("Ctrl+Shift+K")
+    assert not export.playing
+
+
+def test_keys_ask_for_exports(screen: Screen) -> None:
+    for key in ("Ctrl+Shift+E", "Ctrl+S", "Ctrl+Shift+S"):
+        screen.press(key)
+    assert screen.requests == [ExportAction.EXPORT, ExportAction.SAVE_PICTURE, ExportAction.SAVE_PATH]
+    screen.state.export.name = ""
+    screen.press("Ctrl+Shift+E")
+    assert len(screen.requests) == 3  # nothing that cannot be exported is asked for
+
+
+def test_a_right_click_in_the_pad_adds_and_removes_key_frames(screen: Screen) -> None:
+    place = screen.find_in_panel(lambda: (screen.state.u, screen.state.v) != (0.5, 0.5), "left")
+    screen.move(*place)
+    here = screen.state.u, screen.state.v
+    screen.click(*place, button=1)
+    (key,) = screen.state.export.key_frames
+    assert (key.u, key.v) == pytest.approx(here)
+    screen.click(*place, button=1)
+    assert screen.state.export.key_frames == ()
+    screen.press("Ctrl+1")
+    screen.click(*place, button=1)
+    assert screen.state.export.key_frames == ()  # only where the path is seen
+
+
+@pytest.mark.parametrize("product", Product)
+@pytest.mark.parametrize("shape", ["circle", KEY_FRAMES])
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_every_choice_is_drawn(screen: Screen, product: Product, shape: str, scale: float) -> None:
+    export = screen.state.export
+    export.product, export.shape, export.refocus = product, shape, True
+    screen.scale = scale
+    screen.frame(3)
+    assert export.shape == shape
+
+
+def status(phase: Phase, done: int = 0, seconds: float = 0.0, message: str = "") -> Status:
+    return Status(7, "a title", Path("/tmp/a.mp4"), 120, phase, done, seconds, message)
+
+
+def test_the_button_exports_and_the_queue_can_be_cancelled_and_cleared(screen: Screen) -> None:
+    panel = screen.layout.panel
+    assert panel is not None
+    screen.size = (1280.0, 2000.0)  # all of the tab at once
+    screen.frame(3)
+    screen.find_in_panel(lambda: ExportAction.EXPORT in screen.requests, "left")
+    screen.readout = replace(screen.readout, exports=(status(Phase.RUNNING, 30, 10.0),))
+    screen.frame(3)
+    screen.find_in_panel(lambda: CancelExport(7) in screen.requests)
+    screen.readout = replace(
+        screen.readout, exports=(status(Phase.DONE, 120, 9.0), status(Phase.FAILED, message="full"), status(Phase.CANCELLED))
+    )
+    screen.frame(3)
+    screen.find_in_panel(lambda: ExportAction.CLEAR in screen.requests, "left")
+
+
+def test_progress_is_told_in_words() -> None:
+    assert progress_words(status(Phase.WAITING)) == "Waiting"
+    assert progress_words(status(Phase.RUNNING)) == "0 of 120"
+    assert progress_words(status(Phase.RUNNING, 30, 10.0)) == "30 of 120, 3.0/s, 0:30 left"
+
+
+# The program behind it.
+
+
+@pytest.fixture
+def controller(tmp_path: Path) -> Iterator[Controller]:
+    models = {"truth": ModelChoice(TruthSynthesizer, False)}
+    made = Controller(
+        Engine(TruthSynthesizer, 2**24, name="truth"),
+        lambda path, progress, cancelled: light_field(),
+        wake=lambda: None,
+        model="truth",
+        models=models,
+    )
+    made.show_light_field(light_field())
+    made.state.export.folder = str(tmp_path)
+    yield made
+    made.stop()
+
+
+def test_an_export_is_made_and_told(controller: Controller, tmp_path: Path) -> None:
+    export = controller.state.export
+    export.frames, export.name = 4, "round"
+    controller.exports.fulfil(ExportAction.EXPORT, export, controller.light_field, "truth")
+    wait_until(lambda: not controller.exports.busy, "the export", 60)
+    (told,) = controller.readout(None).exports
+    assert (told.phase, told.done, told.message) == (Phase.DONE, 4, "")
+    assert told.target == tmp_path / "round.mp4"
+    assert told.target.stat().st_size > 0
+    with pytest.raises(InputError, match="cannot be used"):
+        controller.exports.fulfil(ExportAction.EXPORT, export, controller.light_field, "unknown")
+
+
+def test_a_saved_path_comes_back_when_it_is_opened(controller: Controller, tmp_path: Path) -> None:
+    export = controller.state.export
+    export.add_key_frame(0.25, 0.5)
+    export.add_key_frame(1, 1)
+    export.name = "mine"
+    plan = export.plan()
+    controller.exports.fulfil(ExportAction.SAVE_PATH, export, controller.light_field, "truth")
+    assert load_plan(tmp_path / "mine.json") == plan
+    export.shape, export.name = "circle", "other"
+    controller.open(tmp_path / "mine.json")
+    assert export.plan() == plan
+    assert (export.name, controller.state.tab) == ("mine", Tab.EXPORT)
+    assert controller.messages == []
+
+
+def test_a_broken_path_is_told(controller: Controller, tmp_path: Path) -> None:
+    save_plan(tmp_path / "a.json", SweepPlan(ShapePath("circle", 0.3)))
+    (tmp_path / "a.json").write_text((tmp_path / "a.json").read_text().replace("0.3", "0.9"))
+    controller.open(tmp_path / "a.json")
+    assert "radius" in controller.messages[0]
+
+
+def test_the_preview_moves_the_viewpoint_until_it_is_dragged(controller: Controller) -> None:
+    export = controller.state.export
+    export.frames, export.fps = 8, 2
+    stops = export.plan().stops()
+    export.play()
+    for second in range(4):
+        controller.tick(100.0 + second)
+        assert controller.viewpoint == pytest.approx((stops[2 * second].u, stops[2 * second].v))
+        assert controller.next_frame_in == pytest.approx(0.5)
+    controller.state.drag_to(0.9, 0.9)
+    controller.tick(105.0)
+    assert not export.playing
+    assert controller.viewpoint == (0.9, 0.9)
+
+
+def test_key_frames_stay_when_the_path_is_played(controller: Controller) -> None:
+    export = controller.state.export
+    export.add_key_frame(0.1, 0.2)
+    export.play()
+    controller.tick(1.0)
+    assert controller.viewpoint == (0.1, 0.2)
+    assert export.key_frames == (Stop(0.1, 0.2, 0.0),)
