@@ -43,9 +43,7 @@ class _Makers:
     @staticmethod
     def of(passes: Passes, textures: Textures) -> _Makers:
         synthesized = Synthesized(passes, textures)
-        return _Makers(
-            textures, synthesized, Inside(passes, textures, synthesized), Compared(passes, textures, synthesized)
-        )
+        return _Makers(textures, synthesized, Inside(passes, textures, synthesized), Compared(passes, textures, synthesized))
 
 
 class Canvas:
@@ -244,6 +242,14 @@ class Canvas:
             return makers.inside.sheet(frame.viewpoint, tone)
         if frame.look.corner is not None:
             return makers.inside.warped(frame.look.corner, frame.viewpoint, tone)
+        if frame.look is Look.LEAN:
+            return makers.inside.lean(frame.viewpoint, frame.share)
+        if frame.look is Look.DISAGREEMENT:
+            return makers.inside.disagreement(frame.viewpoint)
+        if frame.look is Look.SWEEP_MEAN:
+            return makers.inside.sweep_mean(frame.viewpoint, frame.level, tone)
+        if frame.look is Look.SWEEP_DEVIATION:
+            return makers.inside.sweep_deviation(frame.viewpoint, frame.level)
         if frame.look is Look.ERROR:
             return makers.compared.difference(
                 frame.viewpoint, frame.share, frame.partner, frame.difference, frame.gain
@@ -257,14 +263,6 @@ class Canvas:
         if self._makers is None:
             raise RuntimeError("the canvas has no light field")
         return self._makers
-        if frame.look is Look.LEAN:
-            return makers.inside.lean(frame.viewpoint, frame.share)
-        if frame.look is Look.DISAGREEMENT:
-            return makers.inside.disagreement(frame.viewpoint)
-        if frame.look is Look.SWEEP_MEAN:
-            return makers.inside.sweep_mean(frame.viewpoint, frame.level, tone)
-        if frame.look is Look.SWEEP_DEVIATION:
-            return makers.inside.sweep_deviation(frame.viewpoint, frame.level)
 
 
 def _colours(frame: Frame) -> Colours | None:
