@@ -11,9 +11,7 @@ from app.geometry import Point
 from app.worker import Cancel, Done, Job, LatestWorker
 from lfcore.lightfield import LightField
 
-# The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
-# It sleeps for a part of every sixtieth of a second, which is then theirs, so this takes nothing from them.
-SYNTHESIS_NICENESS = 5
+SYNTHESIS_NICENESS = 5  # of the thread that asks: scores and files may wait for the frame loop
 
 
 class Task(Enum):

@@ -1,14 +1,10 @@
-"""What the synthesis thread does with one query: the models, the caches in memory and on disk, the score.
-
-torch is imported here when the first query runs, in that thread, so that the window is up before.
-"""
+"""What the synthesis thread does with one query: the models, the caches in memory and on disk, the score."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -19,15 +15,13 @@ from app.scoring import score as scored
 from app.state import Step
 from app.worker import Cancel
 from lfcore.cache import CacheKey, SynthesisCache, cache_key, held_bytes
-from lfcore.errors import LfviewError, OutputError
+from lfcore.errors import InputError, LfviewError, OutputError, WeightsError
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import to_uint8
 from lfcore.store import ViewStore
+from lfcore.synthesis import Synthesis, Synthesizer
 
-if TYPE_CHECKING:
-    from lfcore.synthesizer import Synthesis, Synthesizer
-
-MakeSynthesizer = Callable[[], "Synthesizer"]
+MakeSynthesizer = Callable[[], Synthesizer]
 
 PERCENTILES = tuple(range(101))
 _PERCENTILE_STRIDE = 3  # every third row and column tell a range well enough, in a tenth of the time
@@ -67,13 +61,13 @@ class _Model:
         self.failure: LfviewError | None = None
 
     def prepare(self) -> Synthesizer:
-        """Load the model, where that has not been done; raises the same error each time where it cannot be done."""
+        """Load the model, where that has not been done; raises the same error each time where there is no such model."""
         if self.failure is not None:
             raise self.failure
         if self.synthesizer is None:
             try:
                 self.synthesizer = self._make()
-            except LfviewError as error:
+            except (InputError, WeightsError) as error:
                 self.failure = error
                 raise
         return self.synthesizer

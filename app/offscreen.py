@@ -21,7 +21,7 @@ from app.controller import Controller
 from app.frametimes import FrameTimes
 from app.geometry import Size
 from app.interface import Interface
-from app.opening import make_engine, open_by_content
+from app.opening import make_engine, open_by_content, synthesis_process
 from lfcore.atomic import atomic_path
 from lfcore.errors import LfviewError, OutputError
 
@@ -113,12 +113,13 @@ def write_png(path: Path, picture: Picture) -> None:
 
 @contextmanager
 def _controller(model: str) -> Iterator[Controller]:
-    engine = make_engine(model, cache_bytes=64 * 2**20)
-    controller = Controller(engine, open_by_content, wake=lambda: None, model=model)
-    try:
-        yield controller
-    finally:
-        controller.stop()
+    with synthesis_process() as process:
+        engine = make_engine(model, 64 * 2**20, process)
+        controller = Controller(engine, open_by_content, wake=lambda: None, model=model)
+        try:
+            yield controller
+        finally:
+            controller.stop()
 
 
 def _wait_for_synthesis(viewer: Offscreen) -> None:

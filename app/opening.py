@@ -1,8 +1,7 @@
-"""How the program comes by light fields and models; both are imported when first asked for, since they are slow to load."""
+"""How the program comes by light fields and models. Readers are imported when first asked for, since they are slow to load."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,11 +12,13 @@ from app.exhibits import Exhibition, open_exhibition
 from assets import weights_path
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
+from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.store import ViewStore
+from lfcore.synthesis import Synthesizer
 
 if TYPE_CHECKING:
-    from lfcore.synthesizer import Synthesizer
     from lfcore.thumbnails import ThumbnailStore
+
 
 
 def open_by_content(
@@ -82,11 +83,22 @@ QUICK = "realtime"
 SHIPPED = ("full", "realtime", "planesweep", "mean")  # lfcore.synthesizer.MODEL_NAMES, without importing torch
 
 
-def make_engine(model: str, cache_bytes: int, store: ViewStore | None = None) -> Engine:
+# The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
+# It sleeps for a part of every sixtieth of a second, which is then theirs, so this takes nothing from them.
+PROCESS_NICENESS = 5
+
+
+def synthesis_process() -> SynthesisProcess:
+    """The process in which the models of one window run; not started yet."""
+    return SynthesisProcess(niceness=PROCESS_NICENESS)
+
+
+def make_engine(model: str, cache_bytes: int, process: SynthesisProcess, store: ViewStore | None = None) -> Engine:
     """The engine on the named model or weight file. While the hand moves, the small networks stand in for larger ones."""
-    quick = synthesizer_factory(QUICK) if weights_path(QUICK).is_file() else None
-    engine = Engine(synthesizer_factory(model), cache_bytes, quick, store, Path(model).name)
-    engine.use(Path(model).name, synthesizer_factory(model), is_slow(model))
+    quick = synthesizer_factory(QUICK, process) if weights_path(QUICK).is_file() else None
+    make = synthesizer_factory(model, process)
+    engine = Engine(make, cache_bytes, quick, store, Path(model).name)
+    engine.use(Path(model).name, make, is_slow(model))
     return engine
 
 
@@ -95,23 +107,12 @@ def is_slow(model: str) -> bool:
     return model == "full" or model.endswith(".safetensors")
 
 
-def offered_models(model: str) -> dict[str, ModelChoice]:
+def offered_models(model: str, process: SynthesisProcess) -> dict[str, ModelChoice]:
     """The models to choose from in the window, by name: the shipped ones, and the one that the program was started with."""
     names = dict.fromkeys([*SHIPPED, model])
-    return {Path(name).name: ModelChoice(synthesizer_factory(name), is_slow(name)) for name in names}
+    return {Path(name).name: ModelChoice(synthesizer_factory(name, process), is_slow(name)) for name in names}
 
 
-def synthesizer_factory(model: str) -> Callable[[], Synthesizer]:
-    """What makes the synthesizer of the named model or weight file when called."""
-
-    def make() -> Synthesizer:
-        # Threads of the networks that wait for each other spin for some microseconds, then sleep: for ever spinning ones would
-        # keep the frame loop, and each other, from the cores; ones that sleep at once make the thousands of small steps of
-        # the plane sweep five times slower (2.1 s in place of 0.45 s). Read when torch is loaded.
-        if "OMP_WAIT_POLICY" not in os.environ:
-            os.environ.setdefault("GOMP_SPINCOUNT", "10000")
-        from lfcore.synthesizer import make_synthesizer
-
-        return make_synthesizer(model)
-
-    return make
+def synthesizer_factory(model: str, process: SynthesisProcess) -> Callable[[], Synthesizer]:
+    """What makes the synthesizer of the named model or weight file, which runs in the process, when called."""
+    return lambda: RemoteSynthesizer(process, model)

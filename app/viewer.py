@@ -22,7 +22,7 @@ from app.engine import Engine, ModelChoice
 from app.frametimes import FrameTimes
 from app.geometry import Rect
 from app.interface import Interface
-from app.opening import DEFAULT_MODEL, make_engine, offered_models, open_by_content, preview, thumbnail_store
+from app.opening import DEFAULT_MODEL, make_engine, offered_models, open_by_content, preview, synthesis_process, thumbnail_store
 from app.settings import SettingsFile, WindowPlace, default_path
 from app.surroundings import Keeping, Surroundings
 from app.window_place import fitted
@@ -66,10 +66,12 @@ def run_viewer(
     keeping = Keeping(settings, fault, file, thumbnail_store if disk_mib > 0 else None)
     chosen = model or settings.model or DEFAULT_MODEL
     store = ViewStore(default_root(), disk_mib * MEBIBYTE) if disk_mib > 0 else None
-    engine = make_engine(chosen, cache_mib * MEBIBYTE, store)
     if path is None and not settings.recent:
         path = sample_path()
-    show(path, engine, Path(chosen).name, foresight, offered_models(chosen), keeping)
+    with synthesis_process() as process:
+        process.start()  # it loads torch while the window and the light field are opened
+        engine = make_engine(chosen, cache_mib * MEBIBYTE, process, store)
+        show(path, engine, Path(chosen).name, foresight, offered_models(chosen, process), keeping)
     return 0
 
 
@@ -97,7 +99,10 @@ def show(
 def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTimes:
     """Frame times on the light field at `path` as `app.frametimes.measure` defines them: in a window, else off screen."""
     try:
-        with _window(make_engine(model, 512 * MEBIBYTE), model) as (window, controller):
+        with (
+            synthesis_process() as process,
+            _window(make_engine(model, 512 * MEBIBYTE, process), model) as (window, controller),
+        ):
             controller.open(path)
             return frametimes.measure(controller, window.poll_and_draw, seconds, "window")
     except NoDisplay:

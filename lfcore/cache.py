@@ -5,15 +5,12 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections import OrderedDict
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from lfcore.lightfield import LightField
-
-if TYPE_CHECKING:
-    from lfcore.synthesizer import Synthesis, Synthesizer
+from lfcore.synthesis import Synthesis, Synthesizer
 
 _POSITION_DECIMALS = 4  # viewpoints nearer than this are one: 1e-4 of the baseline moves no pixel by more than 0.01
 _ENTRY_OVERHEAD = 1024  # bytes counted for the objects around the arrays

@@ -19,7 +19,7 @@ from lfcore.protocols import K16, Protocol, novel_views
 
 if TYPE_CHECKING:
     from lfcore.noise import SceneNoise
-    from lfcore.synthesizer import Synthesis, Synthesizer
+    from lfcore.synthesis import Synthesis, Synthesizer
 
 ERROR_GAIN = 8
 

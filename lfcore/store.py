@@ -15,7 +15,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +22,7 @@ from lfcore.atomic import atomic_path
 from lfcore.cache import CacheKey
 from lfcore.errors import OutputError
 from lfcore.kept_files import KeptFile, code_digest, entries, mark_used, remove
-
-if TYPE_CHECKING:
-    from lfcore.synthesizer import Synthesis
+from lfcore.synthesis import Synthesis
 
 DEFAULT_LIMIT = 2**30
 UNUSED_DAYS = 60.0  # views not looked at for so long are removed
@@ -198,8 +195,6 @@ def _packed(synthesis: Synthesis) -> bytes:
 
 def _unpacked(data: bytes, size: tuple[int, int]) -> Synthesis:
     """The inverse of _packed. Raises ValueError, KeyError or TypeError for anything else."""
-    from lfcore.synthesizer import Synthesis
-
     body, digest = data[:-_DIGEST_BYTES], data[-_DIGEST_BYTES:]
     if not body.startswith(_MAGIC) or hashlib.blake2b(body, digest_size=_DIGEST_BYTES).digest() != digest:
         raise ValueError("damaged")

@@ -13,7 +13,9 @@ from app.engine import Engine, ModelChoice
 from app.opening import SHIPPED, is_slow, offered_models
 from app.state import Step
 from lfcore.errors import WeightsError
-from lfcore.synthesizer import MODEL_NAMES, Synthesis, Synthesizer
+from lfcore.remote import SynthesisProcess
+from lfcore.synthesis import Synthesis, Synthesizer
+from lfcore.synthesizer import MODEL_NAMES
 
 
 class Named(TruthSynthesizer):
@@ -98,6 +100,7 @@ def test_a_model_that_cannot_be_loaded_says_so_and_another_can_be_chosen() -> No
 
 def test_the_shipped_models_are_offered_and_a_weight_file_besides() -> None:
     assert SHIPPED == MODEL_NAMES
-    assert list(offered_models("full")) == list(SHIPPED)
-    assert list(offered_models("some/where/mine.safetensors")) == [*SHIPPED, "mine.safetensors"]
+    process = SynthesisProcess()  # never started
+    assert list(offered_models("full", process)) == list(SHIPPED)
+    assert list(offered_models("some/where/mine.safetensors", process)) == [*SHIPPED, "mine.safetensors"]
     assert is_slow("full") and is_slow("mine.safetensors") and not is_slow("mean")

@@ -26,7 +26,7 @@ def made_up(gl: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Off screen on the run's one GL context, on a made-up light field and a model that knows the truth."""
     monkeypatch.setattr(offscreen, "standalone_context", lambda: gl)
     monkeypatch.setattr(offscreen, "open_by_content", lambda *_: light_field())
-    monkeypatch.setattr(offscreen, "make_engine", lambda _, cache_bytes: Engine(TruthSynthesizer, cache_bytes))
+    monkeypatch.setattr(offscreen, "make_engine", lambda _, cache_bytes, process: Engine(TruthSynthesizer, cache_bytes))
 
 
 def read(path: Path) -> FloatArray:

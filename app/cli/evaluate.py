@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lfcore.noise import SceneNoise
     from lfcore.protocols import Protocol
     from lfcore.report_panels import ScenePanels
-    from lfcore.synthesizer import Synthesizer
+    from lfcore.synthesis import Synthesizer
 
 # Said here too, so that --help needs no library; a test holds it to lfcore.protocols.
 PROTOCOL_NAMES = ("K16", "7x7-Y", "8x8-BGR")

@@ -1,0 +1,133 @@
+"""What runs in the process for synthesis (lfcore.remote): it answers one request after the other until the pipe breaks."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.shared_memory import SharedMemory
+
+import numpy as np
+
+from lfcore.errors import Cancelled, LfviewError
+from lfcore.lightfield import LightField
+from lfcore.remote_messages import (
+    Cancel,
+    Exchange,
+    Failed,
+    Finished,
+    Made,
+    Make,
+    MakeSynthesizer,
+    Reply,
+    Request,
+    Synthesize,
+    Take,
+    Taken,
+)
+from lfcore.synthesis import Synthesizer
+
+_log = logging.getLogger(__name__)
+
+
+def shipped_models(model: str) -> Synthesizer:
+    """lfcore.synthesizer.make_synthesizer, which loads torch."""
+    from lfcore.synthesizer import make_synthesizer
+
+    return make_synthesizer(model)
+
+
+def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
+    """The whole life of the process. Ctrl-C, which the terminal sends to it too, is the program's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(niceness)
+    # Threads of the networks that wait for each other spin for some microseconds, then sleep: for ever spinning ones would
+    # keep the frame loop, and each other, from the cores; ones that sleep at once make the thousands of small steps of
+    # the plane sweep five times slower (2.1 s in place of 0.45 s). Read when torch is loaded.
+    if "OMP_WAIT_POLICY" not in os.environ:
+        os.environ.setdefault("GOMP_SPINCOUNT", "10000")
+    if make is shipped_models:
+        import torch  # noqa: F401  # now, while the program opens its window and its file
+    server = _Server(connection, make)
+    with contextlib.suppress(EOFError, OSError):  # the program has ended
+        while True:
+            request: Request = connection.recv()
+            if not isinstance(request, Cancel):  # one that came too late
+                connection.send(server.reply(request))
+
+
+class _Server:
+    """The models that have been loaded and the light field that they are asked about."""
+
+    def __init__(self, connection: Connection, make: MakeSynthesizer) -> None:
+        self._connection = connection
+        self._make = make
+        self._synthesizers: dict[str, Synthesizer] = {}
+        self._light_field: LightField | None = None
+        self._exchange: Exchange | None = None
+        self._prepared: set[str] = set()  # models that have taken the light field over
+
+    def reply(self, request: Request) -> Reply:
+        """The answer; whatever is raised becomes Failed, so that the process outlives any fault of a query."""
+        try:
+            return self._answer(request)
+        except (LfviewError, Cancelled, MemoryError) as error:
+            return Failed(error)
+        except Exception as error:  # others need not survive the way to the program
+            _log.exception("a synthesis failed")
+            return Failed(RuntimeError(f"{type(error).__name__}: {error}"))
+
+    def _answer(self, request: Request) -> Reply:
+        if isinstance(request, Make):
+            synthesizer = self._make(request.model)
+            self._synthesizers[request.model] = synthesizer
+            return Made(synthesizer.name, synthesizer.key)
+        if isinstance(request, Take):
+            self._take(request)
+            return Taken()
+        assert isinstance(request, Synthesize)
+        return self._synthesize(request)
+
+    def _take(self, request: Take) -> None:
+        if self._exchange is not None:
+            self._exchange.close()
+            self._exchange = None
+        self._prepared.clear()
+        exchange = Exchange(SharedMemory(request.memory), request.shape, request.dtype)
+        # The results of queries will take their place; in the order of CORNERS, columns of the grid come first.
+        views = exchange.corners.copy().reshape(2, 2, *request.shape, 3).swapaxes(0, 1)
+        self._light_field = LightField(np.ascontiguousarray(views), "handed over", "", "")
+        self._exchange = exchange
+
+    def _synthesize(self, request: Synthesize) -> Finished:
+        synthesizer, exchange = self._synthesizers[request.model], self._exchange
+        assert exchange is not None and self._light_field is not None
+        if request.model not in self._prepared:
+            synthesizer.set_light_field(self._light_field)
+            self._prepared.add(request.model)
+        synthesis = synthesizer.synthesize(request.u, request.v, self._cancelled(request.number))
+        exchange.image[:] = synthesis.image
+        if synthesis.disparity is not None:
+            exchange.disparity[:] = synthesis.disparity
+        return Finished(synthesis.disparity is not None, dict(synthesis.timings))
+
+    def _cancelled(self, number: int) -> Callable[[], bool]:
+        """Whether the program has taken its query back."""
+        told = False
+
+        def cancelled() -> bool:
+            nonlocal told
+            try:
+                while not told and self._connection.poll():
+                    message: Request = self._connection.recv()
+                    told = isinstance(message, Cancel) and message.number == number
+            except (EOFError, OSError):
+                sys.exit(0)  # the program has ended
+            return told
+
+        return cancelled

@@ -1,0 +1,45 @@
+"""What a query yields and what a model is asked for; without torch, which programs that only ask need not load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from lfcore.lightfield import FloatArray, LightField
+
+
+@dataclass(frozen=True)
+class Synthesis:
+    """All that one query yields. Arrays are float32; disparity in px over the full corner-to-corner baseline."""
+
+    u: float
+    v: float
+    model: str
+    image: FloatArray  # (H, W, 3), 0 to 1
+    disparity: FloatArray | None  # (H, W); None where the model has none
+    warped: FloatArray | None  # (4, H, W, 3) in the order of CORNERS
+    timings: Mapping[str, float]  # seconds by stage: features, disparity, warp, colour, total
+
+
+def never() -> bool:
+    """Is not cancelled."""
+    return False
+
+
+class Synthesizer(Protocol):
+    """What the viewer, the command line and the evaluation ask of a model."""
+
+    @property
+    def name(self) -> str:
+        """The model's name, for people."""
+
+    @property
+    def key(self) -> str:
+        """Hex digest of model and weights, for caches."""
+
+    def set_light_field(self, light_field: LightField) -> None:
+        """Take over the corner views; what does not depend on (u, v) is computed here."""
+
+    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        """The view at (u, v). Raises InputError outside the allowed range, Cancelled once `cancelled()` holds."""

@@ -1,0 +1,58 @@
+"""Models for tests of synthesis in another process, which finds them here by name."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from lfcore.errors import Cancelled, InputError
+from lfcore.lightfield import CORNERS, FloatArray, LightField
+from lfcore.synthesis import Synthesis, Synthesizer
+
+PATIENT_SECONDS = 30.0
+
+
+def blend(corners: FloatArray, u: float, v: float) -> FloatArray:
+    """Corner views (4, H, W, 3) by their nearness to (u, v): tells them apart by place."""
+    return sum((np.float32(abs(1 - cu - u) * abs(1 - cv - v)) * view for (cu, cv), view in zip(CORNERS, corners, strict=True)),
+               np.zeros_like(corners[0]))
+
+
+class Blender:
+    """Blends the corners. What else happens is told by its name."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.key = f"key of {name}"
+        self._corners: FloatArray | None = None
+
+    def set_light_field(self, light_field: LightField) -> None:
+        self._corners = light_field.corners()
+
+    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = lambda: False) -> Synthesis:
+        assert self._corners is not None
+        if self.name == "patient":
+            end = time.monotonic() + PATIENT_SECONDS
+            while time.monotonic() < end:
+                if cancelled():
+                    raise Cancelled
+                time.sleep(0.005)
+        if self.name == "wrong input":
+            raise InputError("One sentence.")
+        if self.name == "faulty":
+            raise ZeroDivisionError("of the model")
+        if self.name == "dying":
+            os._exit(3)
+        image = blend(self._corners, u, v)
+        disparity = None if self.name == "flat" else np.full(image.shape[:2], u - v, np.float32)
+        return Synthesis(u, v, self.name, image, disparity, None, {"total": 0.5})
+
+
+def make(model: str) -> Synthesizer:
+    """The model of that name."""
+    if model == "missing":
+        raise InputError("There is no such model.")
+    return Blender(model)
