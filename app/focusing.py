@@ -1,0 +1,134 @@
+"""What belongs to refocusing, slices and stereo, as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry import Point, Size
+from lfcore.key_frames import MAX_FOCUS
+
+APERTURE_LIMITS = (0.0, 1.5)  # diameter in baselines; from 1.42 on it takes in all views, from the middle
+BASELINE_LIMITS = (0.02, 1.0)  # between the eyes, in baselines of the light field
+FOCUS_STEP = 0.25  # px over the baseline, by a key
+_APERTURE_FACTOR = 1.25  # by a key
+_LEAST_APERTURE = 0.05  # by a key: below it the aperture is a pinhole
+_GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
+_ENOUGH_VIEWS = 5  # a side, as lfcore.sweep_frames has it
+_ITERATIONS = 4
+
+
+class Choice(Enum):
+    """Which views are summed up; the value is the name on screen."""
+
+    AUTOMATIC = "automatic"
+    CAPTURED = "captured"
+    SYNTHESIZED = "synthesized"
+
+
+@dataclass(frozen=True)
+class Focusing:
+    """`focus`: the disparity that is sharp, px over the baseline. `aperture`: its diameter in baselines. `slices`: whether
+    epipolar slices are shown, `pin`: through which picture point, None: through the cursor. `baseline`: between the eyes of
+    a stereo pair, in baselines; `convergence`: the disparity that both see at the same place."""
+
+    focus: float = 0.0
+    aperture: float = 1.0
+    views: Choice = Choice.AUTOMATIC
+    slices: bool = False
+    pin: Point | None = None
+    baseline: float = 0.3
+    convergence: float = 0.0
+
+    def bounded(self) -> Focusing:
+        """With everything held within its limits."""
+        return replace(
+            self,
+            focus=_between(self.focus, (-MAX_FOCUS, MAX_FOCUS)),
+            aperture=_between(self.aperture, APERTURE_LIMITS),
+            baseline=_between(self.baseline, BASELINE_LIMITS),
+            convergence=_between(self.convergence, (-MAX_FOCUS, MAX_FOCUS)),
+        )
+
+    def focused_at(self, disparity: float) -> Focusing:
+        """Sharp at this disparity."""
+        return replace(self, focus=disparity).bounded()
+
+    def with_aperture_scaled(self, steps: int) -> Focusing:
+        """With an aperture larger by so many steps, or smaller; at the lower end it is a pinhole."""
+        if steps > 0 and self.aperture < _LEAST_APERTURE:
+            return replace(self, aperture=_LEAST_APERTURE)
+        aperture = self.aperture * _APERTURE_FACTOR**steps
+        return replace(self, aperture=0.0 if aperture < _LEAST_APERTURE * 0.99 else aperture).bounded()
+
+    def with_baseline_scaled(self, factor: float) -> Focusing:
+        """With the eyes so many times as far apart."""
+        return replace(self, baseline=self.baseline * factor).bounded()
+
+    def eyes(self, viewpoint: Point) -> tuple[Point, Point]:
+        """Viewpoints of the left and the right eye about the one on screen."""
+        u, v = viewpoint
+        return (u - self.baseline / 2, v), (u + self.baseline / 2, v)
+
+
+def captured_serve(choice: Choice, rows: int, columns: int, span: float | None) -> bool:
+    """Whether the captured views are those to be summed up. `span`: least to greatest disparity of the scene, px over the
+    baseline, None where no disparity is known, and so nothing can be synthesized for the purpose.
+
+    By themselves the captured views are chosen where there are enough of them, and close enough that what is out of focus
+    is smooth.
+    """
+    if choice is not Choice.AUTOMATIC or span is None:
+        return choice is not Choice.SYNTHESIZED or span is None
+    fewest = min(rows, columns)
+    return fewest >= _ENOUGH_VIEWS and span / (fewest - 1) <= _GHOST
+
+
+def focus_limits(percentiles: tuple[float, ...] | None) -> tuple[float, float]:
+    """The disparities between which a slider goes, in whole px: a quarter more than what the scene has, to either side."""
+    if percentiles is None:
+        return -8.0, 8.0
+    low, high = percentiles[0], percentiles[-1]
+    margin = max((high - low) / 4, 0.5)
+    return float(np.floor(low - margin)), float(np.ceil(high + margin))
+
+
+def carried_disparity(
+    disparity_map: npt.NDArray[np.float32], made_at: Point, viewpoint: Point, point: Point
+) -> float | None:
+    """The disparity at a picture point seen from the viewpoint, px over the baseline; None outside the picture.
+
+    disparity_map: (H, W), made for the viewpoint `made_at`. As shaders/carry.glsl, for one point: what lies in front holds.
+    """
+    height, width = disparity_map.shape
+    column, row = int(np.floor(point[0])), int(np.floor(point[1]))
+    if not (0 <= column < width and 0 <= row < height):
+        return None
+    shift = (made_at[0] - viewpoint[0], made_at[1] - viewpoint[1])
+
+    def looked_up(disparity: float) -> float:
+        x = int(np.floor(column + shift[0] * disparity + 0.5))
+        y = int(np.floor(row + shift[1] * disparity + 0.5))
+        return float(disparity_map[min(max(y, 0), height - 1), min(max(x, 0), width - 1)])
+
+    from_here, from_near = 0.0, float(disparity_map.min())
+    before = from_near
+    for _ in range(_ITERATIONS):
+        before = from_near
+        from_here, from_near = looked_up(from_here), looked_up(from_near)
+    return min(from_near, from_here) if abs(from_near - before) < 0.5 else from_here
+
+
+def slice_through(focusing: Focusing, cursor: Point | None, last: Point | None, picture: Size) -> Point:
+    """The picture point through which slices go: pinned, under the cursor, where the cursor was last, or the middle."""
+    for point in (focusing.pin, cursor, last):
+        if point is not None and 0 <= point[0] < picture[0] and 0 <= point[1] < picture[1]:
+            return point
+    return picture[0] / 2, picture[1] / 2
+
+
+def _between(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])
