@@ -21,7 +21,7 @@ def start(area: Rect, context: Context, shelf: Shelf, fonts: theme.Fonts) -> Non
     padding = imgui.get_style().window_padding.x
     across = max(min(_ACROSS, int((area.width - 2 * em() - 2 * padding + gap) // (one.x + gap))), 1)
     shown = _recent_to_show(shelf, across, area.height - 15 * em())
-    width = across * (one.x + gap) - gap + 2 * padding if shown else 25 * em()
+    width = max(min(across, shown) * (one.x + gap) - gap + 2 * padding, 25 * em())
     with card("start", area, (0.5, 0.45), width, CARD & ~imgui.WindowFlags_.no_scrollbar.value):
         with font(fonts.bold, theme.LARGE):
             text("Open a light field")
