@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -28,6 +29,11 @@ MINUS = "\N{MINUS SIGN}"
 def number(value: float, decimals: int) -> str:
     """A number with a true minus sign, so that columns of them line up."""
     return f"{value:.{decimals}f}".replace("-", MINUS)
+
+
+def decibels(value: float) -> str:
+    """A PSNR, which is infinite where two pictures are equal."""
+    return f"{number(value, 2)} dB" if math.isfinite(value) else "equal"
 
 
 def milliseconds(value: float) -> str:

@@ -1,30 +1,112 @@
-"""The tab Compare: the synthesis against the captured view."""
+"""The tab Compare: the picture against its partner, the models at this view, the scores of all captured views."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
+
 from app import theme
 from app.commands import Context
-from app.readout import Readout
-from app.state import Step
-from app.widgets import DASH, font, heading, number, pairs, text
+from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement, Difference, partners
+from app.readout import Readout, ScoreText
+from app.sidebar import score_map
+from app.state import GAIN_LIMITS, Look, Step
+from app.widgets import DASH, choice, decibels, em, font, heading, number, slider, text, tile, tooltip
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     """The whole tab."""
-    heading("Against the captured view", fonts)
-    score = readout.score
-    pairs(
-        "score",
-        [
-            ("PSNR", f"{number(score.psnr, 2)} dB" if score else DASH),
-            ("SSIM", number(score.ssim, 4) if score else DASH),
-        ],
-    )
+    heading("The picture against its partner", fonts)
+    _partner(context, readout)
+    _arrangement(context)
+    _difference(context)
+    _score(context, readout, fonts)
+    heading("Models at this view", fonts)
+    _table(readout)
+    heading("All captured views", fonts)
+    if readout.grid is not None:
+        score_map.draw(context, readout, readout.grid)
+
+
+def _partner(context: Context, readout: Readout) -> None:
+    state = context.state
+    before = state.comparison.partner
+    hint = "What the picture is compared with: the camera's own view, the corner views warped by the newest disparity, "
+    hint += "another model.  (Q: the next one)"
+    chosen = choice("Partner", before, partners(readout.models, readout.model), hint)
+    if chosen != before:
+        state.comparison = replace(state.comparison, partner=chosen)
+
+
+def _arrangement(context: Context) -> None:
+    comparison = context.state.comparison
+    gap = em() * 0.25
+    third = (imgui.get_content_region_avail().x - 2 * gap) / 3
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(gap, imgui.get_style().item_spacing.y))
+    tile("Flip", "flip", comparison.flipped, context, third)
+    imgui.same_line()
+    tile("Wipe", "wipe", comparison.arrangement is Arrangement.WIPE, context, third)
+    imgui.same_line()
+    tile("Beside", "side by side", comparison.arrangement is Arrangement.SIDE_BY_SIDE, context, third)
+    imgui.pop_style_var()
+
+
+def _difference(context: Context) -> None:
+    state = context.state
+    before = state.comparison.difference
+    hint = "How the difference from the partner is drawn; 3 shows it, 1 the picture again.  (E: the next kind)"
+    chosen = Difference(choice("Error", before.value, [each.value for each in Difference], hint))
+    if chosen is not before:
+        state.comparison = replace(state.comparison, difference=chosen)
+        state.look = Look.ERROR
+    imgui.begin_disabled(before is Difference.BLOCKS)
+    hint = "Differences are shown this many times as large.  (, and .)"
+    state.gain = slider("Gain", state.gain, GAIN_LIMITS, f"× {state.gain:.1f}", hint, imgui.SliderFlags_.logarithmic.value)
+    imgui.end_disabled()
+
+
+def _score(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
+    """Of the two pictures that are compared."""
+    score = readout.compared.score
+    text(f"{decibels(score.psnr)}    SSIM {number(score.ssim, 4)}" if score else f"PSNR {DASH}    SSIM {DASH}")
+    tooltip("The picture on screen against its partner, from the very values that are shown")
     with font(fonts.regular, theme.SMALL):
-        text(score.protocol if score else _why_no_score(readout), theme.TEXT_FAINT)
+        text(score.protocol if score else _why_no_score(context, readout), theme.TEXT_FAINT)
 
 
-def _why_no_score(readout: Readout) -> str:
-    if readout.captured_here is None:
+def _why_no_score(context: Context, readout: Readout) -> str:
+    partner = context.state.comparison.partner
+    if partner == CAPTURED_VIEW and readout.captured_here is None:
         return "No captured view at this viewpoint"
-    return "The camera's own view" if readout.step is Step.CAPTURED else "Scored when the synthesis is there"
+    if partner == CAPTURED_VIEW and readout.step is Step.CAPTURED:
+        return "The camera's own view"
+    return "Scored when the hand rests" if partner == INSTANT else "Scored when both syntheses are there"
+
+
+def _table(readout: Readout) -> None:
+    """PSNR and SSIM of each model against the captured view."""
+    table = readout.compared.table
+    if not table:
+        text("No captured view at this viewpoint", theme.TEXT_FAINT)
+        return
+    best = max((score.psnr for _, score in table if score is not None), default=None)
+    imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 1))
+    if imgui.begin_table("models", 3):
+        imgui.table_setup_column("model", imgui.TableColumnFlags_.width_stretch.value, 1.3)
+        for name, score in table:
+            imgui.table_next_row()
+            imgui.table_next_column()
+            text(name, theme.TEXT if name == readout.model else theme.TEXT_SOFT)
+            _cells(score, score is not None and score.psnr == best)
+        imgui.end_table()
+    imgui.pop_style_var()
+
+
+def _cells(score: ScoreText | None, best: bool) -> None:
+    colour = theme.GOOD if best else theme.TEXT
+    imgui.table_next_column()
+    text(decibels(score.psnr) if score else DASH, colour)
+    tooltip(score.protocol if score else "Computed when the hand rests")
+    imgui.table_next_column()
+    text(number(score.ssim, 4) if score else DASH, colour)
