@@ -14,9 +14,11 @@ from scenes import plane
 from test_cache import key, synthesis
 
 from lfcore import store as module
+from lfcore import thumbnails
 from lfcore.cache import CacheKey
 from lfcore.decode.kept import default_store, key_of
 from lfcore.errors import OutputError
+from lfcore.formats.glance import Glance
 from lfcore.kept_files import default_root
 from lfcore.store import UNUSED_DAYS, ViewStore
 from lfcore.synthesizer import Synthesis
@@ -239,6 +241,7 @@ def test_the_verb_says_how_much_there_is_and_removes_it(
     store.put(key(0.1), synthesis())
     store.put(key(0.1, content="another"), synthesis())
     default_store().put(key_of("a capture"), plane(1.0, (2, 2), (40, 50)))
+    thumbnails.default_store().put("a", Glance(None, "Folder, 2 inside"))
     assert main(["cache", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     decoded_bytes = default_store().usage()[1]
@@ -251,10 +254,14 @@ def test_the_verb_says_how_much_there_is_and_removes_it(
         "removed": 0,
         "decoded_captures": 1,
         "decoded_bytes": decoded_bytes,
+        "thumbnails": 1,
+        "thumbnail_bytes": thumbnails.default_store().usage()[1],
     }
     assert main(["cache", "--clear"]) == 0
     told_in_words = capsys.readouterr().out
     assert "2 views removed" in told_in_words and "decoded captures: 1 removed" in told_in_words
+    assert "thumbnails: 1 removed" in told_in_words
     assert main(["cache"]) == 0
     told_in_words = capsys.readouterr().out
     assert "0 views of 0 light fields" in told_in_words and "decoded captures: 0" in told_in_words
+    assert "thumbnails: 0" in told_in_words
