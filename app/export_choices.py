@@ -8,6 +8,7 @@ from enum import Enum
 from functools import lru_cache
 from pathlib import Path
 
+from assets import sample_path
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
 from lfcore.lightfield import LightField
@@ -86,6 +87,7 @@ class ExportChoices:
     name: str = "sweep"
     playing: bool = False
     started: float | None = None  # when the preview began
+    seen_exports: int = 0  # number of the newest export that has been brought into sight
 
     def path(self) -> ViewPath:
         """The path."""
@@ -179,9 +181,10 @@ class ExportChoices:
     # Where it goes.
 
     def suggest(self, light_field: LightField) -> None:
-        """A place for exports of this light field: beside it, or at home where nothing can be written there."""
-        parent = Path(light_field.source).absolute().parent
-        self.folder = str(parent if os.access(parent, os.W_OK) else Path.home())
+        """A place for exports of this light field: beside it, or at home where nothing should be written there."""
+        source = Path(light_field.source).absolute()
+        beside = os.access(source.parent, os.W_OK) and source != sample_path()
+        self.folder = str(source.parent if beside else Path.home())
         self.name = f"{light_field.name} sweep"
         self.playing = False
 

@@ -32,6 +32,7 @@ _LAYERS = {
     "Image | captured": Layer.BESIDE_CAPTURED,
     "Image | disparity": Layer.BESIDE_DISPARITY,
 }
+_LEAST_FPS = 0.1
 _ESLF_SIDE = 14  # views that an ESLF holds along each side
 _SAME_MODEL = "as in the window"
 
@@ -43,7 +44,7 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     choices.product = _chosen("What", choices.product, Product, "What is exported")
     if choices.product is Product.SWEEP:
         _path(context, choices, fonts)
-        _frames(choices, fonts)
+        _frames(choices)
     elif readout.grid is not None:
         _grid(choices, readout.grid)
     _file(context, choices, readout, fonts)
@@ -66,12 +67,7 @@ def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
     else:
         hint = "Reach from the middle view; 0.5 is the edge of the corner views"
         choices.radius = slider("Reach", choices.radius, RADIUS_LIMITS, number(choices.radius, 2), hint)
-    choices.frames = _whole("Frames", choices.frames, (1, MAX_FRAMES), "Number of frames")
-    choices.fps = _decimal("Per second", choices.fps, (0.1, MAX_FPS), "%.4g", "Frames per second")
-    _, choices.refocus = imgui.checkbox("Refocus", choices.refocus)
-    tooltip("Frames are the mean of the views within an aperture, shifted to the disparity in focus.")
-    if choices.refocus:
-        _focus(choices)
+    _length(choices)
     half = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
     button("Stop" if choices.playing else "Play", "play path", context, half)
     imgui.same_line()
@@ -80,11 +76,34 @@ def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
     imgui.end_disabled()
 
 
+def _length(choices: ExportChoices) -> None:
+    """How many frames at which rate, in one line."""
+    imgui.align_text_to_frame_padding()
+    text("Frames", theme.TEXT_SOFT)
+    imgui.same_line(_LABEL * em())
+    imgui.set_next_item_width(4.4 * em())
+    _, frames = imgui.input_int("##frames", choices.frames, 0)
+    choices.frames = min(max(frames, 1), MAX_FRAMES)
+    tooltip("Number of frames")
+    imgui.same_line()
+    text("at", theme.TEXT_SOFT)
+    imgui.same_line()
+    unit = "per s"
+    imgui.set_next_item_width(
+        imgui.get_content_region_avail().x - imgui.calc_text_size(unit).x - imgui.get_style().item_spacing.x
+    )
+    _, fps = imgui.input_float("##fps", choices.fps, 0.0, 0.0, "%.4g")
+    choices.fps = min(max(fps, _LEAST_FPS), MAX_FPS)
+    tooltip("Frames per second")
+    imgui.same_line()
+    text(unit, theme.TEXT_SOFT)
+
+
 def _focus(choices: ExportChoices) -> None:
     first, last = choices.focus
     limits = (-MAX_FOCUS, MAX_FOCUS)
     if choices.shape == KEY_FRAMES:
-        first = _decimal("Focus", first, limits, "%.1f", "Disparity in focus at the next key frame, px from corner to corner")
+        first = _decimal("At", first, limits, "%.1f", "Disparity in focus at the next key frame, px from corner to corner")
     else:
         first = _decimal("From", first, limits, "%.1f", "Disparity in focus where the path begins, px from corner to corner")
         last = _decimal("To", last, limits, "%.1f", "Disparity in focus where the path ends; closed ones go back")
@@ -94,8 +113,7 @@ def _focus(choices: ExportChoices) -> None:
     )
 
 
-def _frames(choices: ExportChoices, fonts: theme.Fonts) -> None:
-    heading("Frames", fonts)
+def _frames(choices: ExportChoices) -> None:
     layers = {layer: name for name, layer in _LAYERS.items()}
     hint = "What the frames show. Errors are shown at captured views only."
     choices.layer = _LAYERS[choice("Show", layers[choices.layer], tuple(_LAYERS), hint)]
@@ -104,9 +122,14 @@ def _frames(choices: ExportChoices, fonts: theme.Fonts) -> None:
     choices.scale = sizes[choice("Size", shown, tuple(dict.fromkeys((*_SIZES, shown))), "Of the views' own size")]
     _, choices.labels = imgui.checkbox("Labels", choices.labels)
     tooltip("Captions with (u, v), and the scales of colours")
-    imgui.same_line(0, em() * 1.2)
+    imgui.same_line(0, em() * 0.9)
     _, choices.brighten = imgui.checkbox("Brighten", choices.brighten)
     tooltip("The display tone for dark captures: ^(1/1.5), saturation × 1.5")
+    imgui.same_line(0, em() * 0.9)
+    _, choices.refocus = imgui.checkbox("Focus", choices.refocus)
+    tooltip("Frames are the mean of the views within an aperture, shifted to the disparity in focus.")
+    if choices.refocus:
+        _focus(choices)
 
 
 def _grid(choices: ExportChoices, grid: Grid) -> None:
@@ -152,6 +175,10 @@ def _queue(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     if not readout.exports:
         return
     heading("Exports", fonts)
+    choices = context.state.export
+    if choices.seen_exports < readout.exports[-1].number:  # a new one has come: into sight with it
+        choices.seen_exports = readout.exports[-1].number
+        imgui.set_scroll_y(imgui.get_scroll_max_y() + imgui.get_window_height())
     for status in reversed(readout.exports):
         imgui.push_id(status.number)
         with font(fonts.regular, theme.SMALL):

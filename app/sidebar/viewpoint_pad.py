@@ -27,7 +27,9 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     exporting = state.tab is Tab.EXPORT or state.export.playing
     if exporting and imgui.is_item_clicked(imgui.MouseButton_.right):
         state.export.add_or_remove_key_frame(u, v)
-    if not imgui.is_item_active():
+    if exporting and not imgui.is_item_active():
+        tooltip("Drag to move the viewpoint. Line: the path; a right click adds or removes a key frame.  (K, Shift+K)")
+    elif not imgui.is_item_active():
         tooltip("Click or drag to move the viewpoint. Dots: captured views; blue: in the cache; rim: extrapolated.  (Arrows)")
 
     def at(point: Point) -> ImVec2:
