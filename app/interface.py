@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -81,6 +82,7 @@ class Interface:
         display = imgui.get_io().display_size
         state = self.controller.state
         readout = replace(self.controller.readout(self._picture_ms), shelf=self.surroundings.shelf())
+        readout = replace(readout, focus=replace(readout.focus, summed=self._canvas.summed))
         layout, requests = panels.draw(state, readout, (display.x, display.y), self._scale, self._fonts)
         imgui.render()
         # What the panels changed is drawn in this very frame.
@@ -101,6 +103,11 @@ class Interface:
             self._save_picture(target, layout, pixels)
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+
+    @property
+    def next_frame_in(self) -> float | None:
+        """As Controller.next_frame_in, but 0 also while the picture becomes better with every frame."""
+        return 0.0 if self._canvas.unfinished else self.controller.next_frame_in
 
     def warm_up(self) -> None:
         """Make the graphics ready for the first light field, while it is being opened."""
@@ -163,7 +170,9 @@ class Interface:
         state = controller.state
         size = panels.picture_size(controller.readout(None), state)
         seen = _scaled(visible(place(state.zoom, size, layout.picture), size, layout.picture), pixels)
-        left, top, width, height = (round(value) for value in (seen.x, seen.y, seen.width, seen.height))
+        # Only whole pixels of the picture: at its edges the background shines through.
+        left, top = math.ceil(seen.x), math.ceil(seen.y)
+        width, height = math.floor(seen.x + seen.width) - left, math.floor(seen.y + seen.height) - top
         if min(width, height) < 1:
             return
         corner = (left, target.size[1] - top - height)
@@ -187,6 +196,7 @@ class Interface:
                 corners = np.stack([light_field.views[-int(v), -int(u)] for u, v in CORNERS])  # (4, H, W, 3)
                 try:
                     canvas.set_light_field(corners)
+                    canvas.set_views(light_field.views, light_field.dark)
                 except LfviewError as error:
                     controller.close()
                     controller.say(str(error))
@@ -278,8 +288,14 @@ class Interface:
             disparity_range=controller.disparity_range or (0.0, 1.0),
             colour_map=state.looking.colour_map,
             level=state.looking.level,
+            focusing=state.focusing,
+            captured_summed=self._captured_summed,
             dim=dim,
         )
+
+    @property
+    def _captured_summed(self) -> bool:
+        return self.controller.captured_summed or not self._canvas.has_disparity
 
     def _partner_frame(self) -> Frame:
         """What the picture is compared with; where that has none here, the picture, dimmed."""
