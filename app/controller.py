@@ -21,6 +21,7 @@ from app.desk import Card, Folder
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.exports import Exports, take_plan
+from app.focusing import FocusFacts, captured_serve, carried_disparity, focus_limits
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
@@ -42,6 +43,7 @@ _FARTHER = 0.02
 # field moves visibly by it, and the camera's view or the finished picture is there at once.
 MAGNET_RADIUS = 0.012
 STOP_SECONDS = 10.0
+_SPAN_TAIL = 1.0  # per cent of the disparities left out at either end of a scene's range
 
 
 class Controller:
@@ -76,6 +78,7 @@ class Controller:
         self.exports = Exports(self._models, wake, self._hand_waits)
         self._grid: Grid | None = None
         self._next: Answer | None = None  # has come while the one before is still being faded in
+        self._span: tuple[float, float] | None = None  # least and greatest disparity of the scene, by the first map
         self._shown: Point | None = None  # viewpoint at the last tick
         self._heading: Point = (0.0, 0.0)
         self._moved_at = -math.inf
@@ -151,6 +154,7 @@ class Controller:
         if self.light_field is None:
             return
         self._play(now)
+        self._pick()
         if self._shown != self.viewpoint:
             self._follow(self.light_field)
         if self._resting and self.state.hand is not None:
@@ -258,6 +262,7 @@ class Controller:
             disparity_under_cursor=self._disparity_under_cursor(),
             captured_here=self.captured_here,
             compared=self._compared(),
+            focus=self._focus_facts(),
             captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
             value_under_cursor=self._value_under_cursor(),
             exports=self.exports.statuses,
@@ -286,6 +291,26 @@ class Controller:
         stop = choices.stop_at(now)
         if stop is not None:
             self.state.move_to(stop.u, stop.v)
+            if stop.focus is not None:
+                self.state.refocus_at(stop.focus)
+
+    def _pick(self) -> None:
+        """Focus on the point that was clicked, as soon as its disparity is known."""
+        pick = self.state.pick
+        disparity = None if pick is None else self._disparity_at(pick)
+        if disparity is not None:
+            self.state.pick = None
+            self.state.refocus_at(disparity)
+
+    def _disparity_at(self, point: Point) -> float | None:
+        """The disparity at a picture point, carried to the viewpoint on screen; px over the baseline."""
+        newest = self.newest
+        if newest is None or newest.synthesis.disparity is None:
+            return None
+        return carried_disparity(newest.synthesis.disparity, _viewpoint_of(newest), self.viewpoint, point)
+
+    def _focus_facts(self) -> FocusFacts:
+        return FocusFacts(focus_limits(self._span), self.captured_summed)
 
     def _hand_waits(self) -> bool:
         """Whether the person waits for a view, which comes before exports."""
@@ -305,6 +330,12 @@ class Controller:
         if self.light_field is not None:
             self._count(self.light_field)
             self._look_up(self.light_field)
+
+    @property
+    def captured_summed(self) -> bool:
+        """Whether refocusing sums up captured views, not such as are drawn in between."""
+        grid = self._grid
+        return grid is None or captured_serve(self.state.focusing.views, grid.rows, grid.columns, self._span)
 
     @property
     def _resting(self) -> bool:
@@ -348,6 +379,8 @@ class Controller:
         self.newest = self.picture = self._next = None
         self._asking.forget()
         self.comparing.forget()
+        self._span = None
+        self.state.pick = None
         self._shown = None
         self._heading = (0.0, 0.0)
         self._grid = None
@@ -417,6 +450,8 @@ class Controller:
             self._fade_from = self._now
             self._fade_seconds = FADE_SECONDS if self._resting else STREAM_FADE_SECONDS
         self.newest = answer
+        if self._span is None and answer.percentiles is not None:
+            self._span = disparity_range(answer.percentiles, _SPAN_TAIL)
         if exact:
             self.picture = answer
 

@@ -14,6 +14,7 @@ from lfcore.key_frames import MAX_FOCUS
 APERTURE_LIMITS = (0.0, 1.5)  # diameter in baselines; from 1.42 on it takes in all views, from the middle
 BASELINE_LIMITS = (0.02, 1.0)  # between the eyes, in baselines of the light field
 FOCUS_STEP = 0.25  # px over the baseline, by a key
+BASELINES = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)  # of stereo, by a key
 _APERTURE_FACTOR = 1.25  # by a key
 _LEAST_APERTURE = 0.05  # by a key: below it the aperture is a pinhole
 _GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
@@ -64,19 +65,26 @@ class Focusing:
         aperture = self.aperture * _APERTURE_FACTOR**steps
         return replace(self, aperture=0.0 if aperture < _LEAST_APERTURE * 0.99 else aperture).bounded()
 
-    def with_baseline_scaled(self, factor: float) -> Focusing:
-        """With the eyes so many times as far apart."""
-        return replace(self, baseline=self.baseline * factor).bounded()
-
     def eyes(self, viewpoint: Point) -> tuple[Point, Point]:
         """Viewpoints of the left and the right eye about the one on screen."""
         u, v = viewpoint
         return (u - self.baseline / 2, v), (u + self.baseline / 2, v)
 
 
-def captured_serve(choice: Choice, rows: int, columns: int, span: float | None) -> bool:
-    """Whether the captured views are those to be summed up. `span`: least to greatest disparity of the scene, px over the
-    baseline, None where no disparity is known, and so nothing can be synthesized for the purpose.
+@dataclass(frozen=True)
+class FocusFacts:
+    """What panels print about it. `limits`: least and greatest focus of a slider, px over the baseline. `captured`: whether
+    captured views are summed up, `summed`: how many of which. `under`: the disparity where slices go through."""
+
+    limits: tuple[float, float] = (-8.0, 8.0)
+    captured: bool = True
+    summed: str = ""
+    under: float | None = None
+
+
+def captured_serve(choice: Choice, rows: int, columns: int, span: tuple[float, float] | None) -> bool:
+    """Whether the captured views are those to be summed up. `span`: least and greatest disparity of the scene, px over the
+    baseline, None where no disparity is known, and so nothing can be drawn in between.
 
     By themselves the captured views are chosen where there are enough of them, and close enough that what is out of focus
     is smooth.
@@ -84,14 +92,14 @@ def captured_serve(choice: Choice, rows: int, columns: int, span: float | None) 
     if choice is not Choice.AUTOMATIC or span is None:
         return choice is not Choice.SYNTHESIZED or span is None
     fewest = min(rows, columns)
-    return fewest >= _ENOUGH_VIEWS and span / (fewest - 1) <= _GHOST
+    return fewest >= _ENOUGH_VIEWS and (span[1] - span[0]) / (fewest - 1) <= _GHOST
 
 
-def focus_limits(percentiles: tuple[float, ...] | None) -> tuple[float, float]:
+def focus_limits(span: tuple[float, float] | None) -> tuple[float, float]:
     """The disparities between which a slider goes, in whole px: a quarter more than what the scene has, to either side."""
-    if percentiles is None:
-        return -8.0, 8.0
-    low, high = percentiles[0], percentiles[-1]
+    if span is None:
+        return FocusFacts().limits
+    low, high = span
     margin = max((high - low) / 4, 0.5)
     return float(np.floor(low - margin)), float(np.ceil(high + margin))
 

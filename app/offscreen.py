@@ -60,7 +60,7 @@ class Offscreen:
         """The frame after imgui has found its sizes and every fade has ended."""
         for _ in range(_SETTLE_FRAMES):
             self.frame()
-        while self.interface.controller.next_frame_in == 0.0:
+        while self.interface.next_frame_in == 0.0:
             self.frame()
         return self.frame()
 

@@ -14,7 +14,7 @@ from app.layout import Layout, lay_out
 from app.panes import arrange
 from app.readout import Readout
 from app.sidebar import extras
-from app.state import Look, ViewState
+from app.state import ViewState
 
 _NO_PICTURE: Size = (1, 1)
 
@@ -77,4 +77,5 @@ def picture_size(readout: Readout, state: ViewState) -> Size:
     grid = readout.grid
     if grid is None:
         return _NO_PICTURE
-    return (2 * grid.width, 2 * grid.height) if state.look is Look.WARPED_ALL else (grid.width, grid.height)
+    columns, rows = state.look.tiles
+    return columns * grid.width, rows * grid.height

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.comparison import Arrangement, Comparison
 from app.geometry import Placement, Point, Rect, Size, Zoom, place
-from app.state import Look, ViewState
+from app.state import ViewState
 
 GAP = 2.0  # window units between two pictures side by side
 
@@ -25,9 +25,9 @@ class Pane:
 
 
 def arrange(state: ViewState, area: Rect) -> tuple[Pane, ...]:
-    """The panes of this area. What belongs to the picture itself comes first; a sheet of four pictures stands alone."""
+    """The panes of this area. What belongs to the picture itself comes first; a sheet of several pictures stands alone."""
     comparison = state.comparison
-    if state.look is Look.WARPED_ALL:
+    if state.look.tiles != (1, 1):
         return (Pane(area, area, False),)
     if comparison.flipped:
         return (Pane(area, area, True),)

@@ -12,6 +12,7 @@ from app.widgets import FIXED, window
 # Window units (at scale 1) of a drag from corner view to corner view.
 DRAG_SPAN = 360.0
 WHEEL_STEP = 1.2
+CLICK_REACH = 3.0  # window units that the mouse may move between press and release of a click
 
 
 def draw(area: Rect, panes: tuple[Pane, ...], state: ViewState, picture: Size, scale: float) -> None:
@@ -22,8 +23,11 @@ def draw(area: Rect, panes: tuple[Pane, ...], state: ViewState, picture: Size, s
     if delta is not None:
         _drag(state, delta, picture, area, scale)
     _hover(state, picture, area, hovered)
-    if state.cursor is not None and state.look is Look.WARPED_ALL:
-        state.cursor = (state.cursor[0] % (picture[0] / 2), state.cursor[1] % (picture[1] / 2))
+    columns, rows = state.look.tiles
+    if state.cursor is not None:
+        state.cursor = (state.cursor[0] % (picture[0] / columns), state.cursor[1] % (picture[1] / rows))
+    if delta is not None:
+        _pick(state)
 
 
 def draw_still(area: Rect, state: ViewState, picture: Size) -> None:
@@ -66,12 +70,24 @@ def _hover(state: ViewState, picture: Size, area: Rect, hovered: bool) -> None:
 
 def _drag(state: ViewState, delta: tuple[float, float], picture: Size, area: Rect, scale: float) -> None:
     turns = imgui.is_mouse_down(0) or imgui.is_mouse_released(0)
+    if turns and imgui.get_io().key_shift:
+        return  # it focuses
     if not turns or imgui.is_key_down(imgui.Key.space):
         if delta != (0.0, 0.0):
             state.zoom = pan_by(state.zoom, delta, picture, area)
         return
     # u is the camera's own position to the right, so to turn the scene to the right the camera goes to the left.
     state.drag_by(-delta[0] / (DRAG_SPAN * scale), -delta[1] / (DRAG_SPAN * scale))
+
+
+def _pick(state: ViewState) -> None:
+    """Focus on what is under the mouse: while it is pressed with Shift, or at a click while refocusing."""
+    if imgui.get_io().key_shift and imgui.is_mouse_down(0):
+        state.pick = state.cursor
+        return
+    moved = imgui.get_mouse_drag_delta(0, 0.0)
+    if state.look is Look.REFOCUS and imgui.is_mouse_released(0) and max(abs(moved.x), abs(moved.y)) <= CLICK_REACH:
+        state.pick = state.cursor
 
 
 def _under(mouse: tuple[float, float], state: ViewState, picture: Size, area: Rect) -> tuple[float, float] | None:

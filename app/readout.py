@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from app.desk import Shelf
 from app.exporting import Status
+from app.focusing import FocusFacts
 from app.geometry import Point
 from app.state import Grid, Step
 
@@ -69,6 +70,7 @@ class Readout:
     disparity_under_cursor: float | None = None
     captured_here: int | None = None  # number of the captured view at (u, v)
     compared: Compared = field(default_factory=Compared)
+    focus: FocusFacts = field(default_factory=FocusFacts)
     captions: tuple[Caption, ...] = ()  # of what a Lytro file without raw shows; `kind` then says what it is
     value_under_cursor: float | None = None  # in the unit of the caption
     cached: tuple[Point, ...] = ()  # viewpoints in the cache

@@ -9,6 +9,7 @@ from enum import Enum
 from app.comparison import Comparison
 from app.desk import Desk
 from app.export_choices import ExportChoices
+from app.focusing import Focusing
 from app.geometry import Point, Zoom
 from app.looking import Looking
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
@@ -32,6 +33,10 @@ class Look(Enum):
     DISAGREEMENT = "Where the warped inputs disagree"
     SWEEP_MEAN = "Plane sweep, mean"
     SWEEP_DEVIATION = "Plane sweep, deviation"
+    REFOCUS = "Refocused"
+    ANAGLYPH = "Stereo, red and cyan"
+    STEREO_PARALLEL = "Stereo, side by side"
+    STEREO_CROSSED = "Stereo, crossed eyes"
 
     @property
     def corner(self) -> int | None:
@@ -44,6 +49,18 @@ class Look(Enum):
         return self in _BY_DISPARITY or self.corner is not None
 
     @property
+    def tiles(self) -> tuple[int, int]:
+        """(columns, rows) of the pictures of one viewpoint that it lays side by side."""
+        if self is Look.WARPED_ALL:
+            return 2, 2
+        return (2, 1) if self in (Look.STEREO_PARALLEL, Look.STEREO_CROSSED) else (1, 1)
+
+    @property
+    def is_stereo(self) -> bool:
+        """Whether it shows what two eyes see."""
+        return self in (Look.ANAGLYPH, Look.STEREO_PARALLEL, Look.STEREO_CROSSED)
+
+    @property
     def is_sweep(self) -> bool:
         """Whether it is of the plane sweep at a level."""
         return self is Look.SWEEP_MEAN or self is Look.SWEEP_DEVIATION
@@ -54,7 +71,17 @@ class Look(Enum):
         return self is Look.DISAGREEMENT or self is Look.SWEEP_DEVIATION
 
 
-_BY_DISPARITY = frozenset((Look.DISPARITY, Look.WARPED_ALL, Look.LEAN, Look.DISAGREEMENT))
+_BY_DISPARITY = frozenset(
+    (
+        Look.DISPARITY,
+        Look.WARPED_ALL,
+        Look.LEAN,
+        Look.DISAGREEMENT,
+        Look.ANAGLYPH,
+        Look.STEREO_PARALLEL,
+        Look.STEREO_CROSSED,
+    )
+)
 _SINGLE_CORNER = {
     Look.WARPED_TOP_LEFT: 0,
     Look.WARPED_BOTTOM_LEFT: 1,
@@ -152,6 +179,8 @@ class ViewState:
     zoom: Zoom = field(default_factory=Zoom)
     gain: float = 8.0  # of the error look
     comparison: Comparison = field(default_factory=Comparison)
+    focusing: Focusing = field(default_factory=Focusing)
+    pick: Point | None = None  # a picture point on which the person wants to focus
     tail: float = 1.0  # per cent of the disparity values left out at either end of the colour range
     model: str = ""  # for a hand at rest; empty: the one that the program was started with
     foresight: bool = True  # compute views that may be wanted next while nothing else is to be done
@@ -170,6 +199,11 @@ class ViewState:
         """Go to a viewpoint, clamped to the extrapolation limit."""
         self.hand = None
         self.u, self.v = clamp_viewpoint(u, v)
+
+    def refocus_at(self, disparity: float) -> None:
+        """Show the picture with this disparity (px over the baseline) in focus."""
+        self.focusing = self.focusing.focused_at(disparity)
+        self.look = Look.REFOCUS
 
     def drag_by(self, du: float, dv: float) -> None:
         """Move the hand, and with it the viewpoint."""

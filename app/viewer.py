@@ -281,7 +281,7 @@ class _Window:
         if more_due:
             return to_next_frame
         waits = [_IDLE_INTERVAL]
-        for due_in in (self._at_hand.controller.next_frame_in, self._at_hand.surroundings.next_frame_in):
+        for due_in in (self._at_hand.next_frame_in, self._at_hand.surroundings.next_frame_in):
             if due_in is not None:
                 waits.append(max(due_in, to_next_frame))
         if now - self._touched_at < _HOVER_SECONDS:

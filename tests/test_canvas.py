@@ -360,5 +360,5 @@ def test_places_are_found_in_the_messages_of_all_compilers(message: str) -> None
 def test_includes_are_resolved_once_and_may_be_exchanged() -> None:
     source = glsl.load("instant.frag", {"tone.glsl": "tone_stored.glsl"})
     assert "#include" not in source.text
-    assert source.files == ("instant.frag", "carry.glsl", "warp.glsl", "bicubic.glsl", "tone_stored.glsl")
+    assert source.files == ("instant.frag", "carry.glsl", "warped_corners.glsl", "warp.glsl", "bicubic.glsl", "tone_stored.glsl")
     assert "sample_area.glsl" in glsl.load("show_image.frag", {"sampled.glsl": "sample_area.glsl"}).files

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.canvas.gathered import Captured, Synthesized, kept, spread_order
+from app.canvas.gathered import Captured, kept, spread_order
 from app.canvas.passes import Passes
 from app.canvas.refocus import Refocused, Wanted, coarse_views
 from app.canvas.textures import Textures
@@ -38,7 +38,6 @@ class Bench:
         self.textures = Textures(gl, corners(scene), "f4")
         self.refocused = Refocused(gl, passes, self.textures)
         self.refocused.set_views(scene.views, scene.dark)
-        self.synthesized = Synthesized(gl, passes, self.textures)
 
     def give(self, image: FloatArray, disparity: FloatArray, viewpoint: tuple[float, float]) -> None:
         """A synthesis, as the canvas takes it."""
@@ -53,12 +52,12 @@ class Bench:
     def frames(self, wanted: Wanted) -> Iterator[FloatArray]:
         """What is shown frame by frame until it is finished."""
         for _ in range(1000):
-            self.refocused.advance(wanted)
+            more = self.refocused.advance(wanted)
             texture = self.refocused.picture(wanted, Tone())
             assert texture is not None
             width, height = self.textures.size
             yield np.frombuffer(texture.read(), np.float32).reshape(height, width, -1)[..., :3]
-            if not self.refocused.unfinished:
+            if not more:
                 return
         raise AssertionError("it is never finished")
 
@@ -68,7 +67,6 @@ class Bench:
 
     def release(self) -> None:
         self.refocused.release()
-        self.synthesized.release()
         self.textures.release()
 
 

@@ -20,6 +20,8 @@ from app.canvas.inside import Inside
 from app.canvas.magnifier import Colours, Magnifier
 from app.canvas.passes import Passes
 from app.canvas.placing import shown_size
+from app.canvas.refocus import Refocused, Wanted
+from app.canvas.stereo import Stereo
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
 from app.comparison import Source
@@ -39,11 +41,20 @@ class _Makers:
     synthesized: Synthesized
     inside: Inside
     compared: Compared
+    refocused: Refocused
+    stereo: Stereo
 
     @staticmethod
-    def of(passes: Passes, textures: Textures) -> _Makers:
+    def of(context: moderngl.Context, passes: Passes, textures: Textures) -> _Makers:
         synthesized = Synthesized(passes, textures)
-        return _Makers(textures, synthesized, Inside(passes, textures, synthesized), Compared(passes, textures, synthesized))
+        return _Makers(
+            textures,
+            synthesized,
+            Inside(passes, textures, synthesized),
+            Compared(passes, textures, synthesized),
+            Refocused(context, passes, textures),
+            Stereo(context, passes, textures),
+        )
 
 
 class Canvas:
@@ -64,6 +75,7 @@ class Canvas:
         # Bound before framebuffers are released: moderngl would otherwise go on binding one that is gone.
         self._resting_place = context.simple_framebuffer((1, 1))
         self._makers: _Makers | None = None
+        self.unfinished = False  # the frame prepared last becomes better with the next ones
         self._exhibit: moderngl.Texture | None = None  # what is shown in place of a light field
 
     # What there is to draw.
@@ -78,7 +90,7 @@ class Canvas:
                 f"open a light field with smaller views."
             )
         self.clear()
-        self._makers = _Makers.of(self.passes, Textures(self.context, corners, self._picture_type))
+        self._makers = _Makers.of(self.context, self.passes, Textures(self.context, corners, self._picture_type))
 
     def warm_up(self) -> None:
         """Run every pass of the moving picture once on a made-up light field; there must be no other.
@@ -102,8 +114,11 @@ class Canvas:
         self._resting_place.use()
         if self._makers is not None:
             self._makers.compared.release()
+            self._makers.refocused.release()
+            self._makers.stereo.release()
             self._makers.textures.release()
             self._makers = None
+        self.unfinished = False
 
     def set_synthesis(self, image: FloatArray, pixels: _Bytes, disparity: FloatArray | None, viewpoint: Point) -> None:
         """Take the newest synthesis: image (H, W, 3), the same as uint8 (H, W, 4), disparity (H, W) in px over the baseline
@@ -127,6 +142,13 @@ class Canvas:
         """Take the captured view (H, W, 3), as stored, to be compared with or looked at."""
         self._at_hand.textures.captured.write(np.ascontiguousarray(view))
         self._at_hand.textures.current.clear()
+
+    def set_views(self, views: npt.NDArray[np.generic], dark: frozenset[tuple[int, int]]) -> None:
+        """Take all captured views (V, U, H, W, 3), as stored, of which `dark` ones, by row and column, are not to be used.
+
+        They are handed to the graphics when they are first needed, a few in each frame.
+        """
+        self._at_hand.refocused.set_views(views, dark)
 
     def set_partner(self, image: FloatArray) -> None:
         """Take the synthesis of the viewpoint by another model (H, W, 3), to be compared with or looked at."""
@@ -194,6 +216,8 @@ class Canvas:
     def prepare(self, frame: Frame) -> bool:
         """Make the picture at the light field's own size that the frame shows; whether it was not up to date."""
         made = self._at_hand.textures.made
+        refocused = frame.look is Look.REFOCUS
+        self.unfinished = self._at_hand.refocused.advance(_wanted(frame)) if refocused else False
         self._texture_of(frame)
         return self._at_hand.textures.made != made
 
@@ -217,6 +241,9 @@ class Canvas:
     def read(self, frame: Frame) -> FloatArray:
         """What `draw` would show of this frame at one window pixel per picture pixel: float32 (H, W, 3)."""
         width, height = self.picture_size(frame.look)
+        self.prepare(frame)
+        while self.unfinished:
+            self.prepare(frame)
         texture = self.context.texture((width, height), 4, dtype="f4")
         framebuffer = self.context.framebuffer([texture])
         try:
@@ -228,6 +255,11 @@ class Canvas:
             framebuffer.release()
             texture.release()
         return values.reshape(height, width, 3)[::-1].copy()  # GL's first row is the lowest
+
+    @property
+    def summed(self) -> str:
+        """Which views the refocused picture is made of, in words."""
+        return self._makers.refocused.words if self._makers is not None else ""
 
     def timer(self) -> moderngl.Query:
         """A timer of what is drawn within it, by the graphics' own clock; read it one frame later, so that nothing waits."""
@@ -254,6 +286,13 @@ class Canvas:
             return makers.compared.difference(
                 frame.viewpoint, frame.share, frame.partner, frame.difference, frame.gain
             )
+        if frame.look is Look.ANAGLYPH:
+            return makers.stereo.anaglyph(frame.viewpoint, frame.focusing, tone)
+        if frame.look.is_stereo:
+            return makers.stereo.pair(frame.viewpoint, frame.focusing, frame.look is Look.STEREO_CROSSED, tone)
+        refocused = makers.refocused.picture(_wanted(frame), tone) if frame.look is Look.REFOCUS else None
+        if refocused is not None:
+            return refocused
         if frame.source is not Source.SYNTHESIS:
             return makers.compared.partner(frame.source, frame.viewpoint, tone).texture
         return makers.synthesized.picture(frame.viewpoint, frame.share, tone).texture
@@ -263,6 +302,10 @@ class Canvas:
         if self._makers is None:
             raise RuntimeError("the canvas has no light field")
         return self._makers
+
+
+def _wanted(frame: Frame) -> Wanted:
+    return Wanted(frame.viewpoint, frame.focusing.focus, frame.focusing.aperture, frame.captured_summed)
 
 
 def _colours(frame: Frame) -> Colours | None:

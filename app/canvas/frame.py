@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import moderngl
 
 from app.comparison import Difference, Source
+from app.focusing import Focusing
 from app.geometry import Point, Size
 from app.state import Look
 from app.tone import Tone
@@ -30,6 +31,8 @@ class Frame:
     disparity_range: tuple[float, float] = (0.0, 1.0)
     colour_map: ColourMap = ColourMap.VIRIDIS
     level: float = 0.0  # of the plane sweep, px over the baseline
+    focusing: Focusing = field(default_factory=Focusing)
+    captured_summed: bool = True  # where it is refocused: captured views are summed up, else such as are drawn in between
     dim: float = 1.0
 
 

@@ -6,16 +6,18 @@ Captured views are handed to the graphics, views in between are drawn there, a f
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from app.canvas.passes import AnyTexture, Passes
+from app.canvas.elsewhere import draw_elsewhere
+from app.canvas.passes import Passes
 from app.canvas.textures import Textures
-from app.geometry import Point, Size
-from app.state import CARRIED_FAR
+from app.geometry import Size
+from app.tone import Tone
 from lfcore.lightfield import as_float
 from lfcore.metrics import to_uint8
 
@@ -26,7 +28,7 @@ _DRAWN_PER_FRAME = 200_000  # pixels drawn in one frame
 _BETTER = 0.05  # of the baseline: a synthesis this much nearer is worth drawing a view anew
 
 
-class Gathered:
+class Gathered(ABC):
     """Views at the crossings of a grid over the square of viewpoints. `columns_at`, `rows_at`: their u and v."""
 
     def __init__(
@@ -45,6 +47,19 @@ class Gathered:
         """Where the view with that number lies in the texture, px."""
         row, column = divmod(index, len(self.columns_at))
         return column * self.size[0], row * self.size[1]
+
+    @property
+    @abstractmethod
+    def complete(self) -> bool:
+        """Whether all are there."""
+
+    @abstractmethod
+    def fill(self) -> None:
+        """Put some more of them there: the part of one frame."""
+
+    @abstractmethod
+    def words(self, count: int) -> str:
+        """So many of these views."""
 
     @property
     def spacing(self) -> float:
@@ -83,6 +98,11 @@ class Captured(Gathered):
         """Whether all are there."""
         return not self._waiting
 
+    def words(self, count: int) -> str:
+        """So many of these views."""
+        rows, columns = self._views.shape[:2]
+        return f"{count} of {rows * columns} captured views"
+
     def fill(self) -> None:
         """Hand over some more."""
         width, height = self.size
@@ -95,8 +115,7 @@ class Captured(Gathered):
 
 
 class Synthesized(Gathered):
-    """Views in between, drawn from what is at hand: each from the newest synthesis, carried by its disparity, where that is
-    near, else from the four corner views, warped by the same disparity. A view is drawn anew when a nearer synthesis comes."""
+    """Views in between, drawn from what is at hand as app.canvas.elsewhere has it; anew when a nearer synthesis comes."""
 
     def __init__(
         self, context: moderngl.Context, passes: Passes, textures: Textures, most_bytes: int = MOST_BYTES
@@ -109,6 +128,10 @@ class Synthesized(Gathered):
         self._textures = textures
         self._target = context.framebuffer([self.texture])
         self._distance = np.full(len(self.positions), np.inf)  # from the synthesis that each was drawn from
+
+    def words(self, count: int) -> str:
+        """So many of these views."""
+        return f"{count} views in between"
 
     @property
     def complete(self) -> bool:
@@ -124,7 +147,7 @@ class Synthesized(Gathered):
         width, height = self.size
         for index in self._gains()[: max(_DRAWN_PER_FRAME // (width * height), 1)]:
             at = (float(self.positions[index][0]), float(self.positions[index][1]))
-            self._draw(int(index), at, made_at)
+            draw_elsewhere(self._passes, textures, self._target, self.tile(int(index)), at, Tone())
             self._distance[index] = math.dist(at, made_at)
             self.filled[index] = True
             self.version += 1
@@ -142,23 +165,6 @@ class Synthesized(Gathered):
         distance = np.hypot(*(self.positions - made_at).T)
         worth = self._distance - distance > _BETTER
         return np.array([index for index in self.order if worth[index]], np.intp)
-
-    def _draw(self, index: int, at: Point, made_at: Point) -> None:
-        textures, tile = self._textures, self.tile(index)
-        self._target.viewport = (*tile, *self.size)
-        self._target.use()
-        near = textures.made_at == textures.newest_at and math.dist(at, made_at) <= CARRIED_FAR
-        source: AnyTexture = textures.syntheses if near else textures.corner_views
-        self._passes.get("gathered.frag", seen="seen_carried.glsl" if near else "seen_warped.glsl").render(
-            {"syntheses" if near else "corner_views": source, "disparity_map": textures.disparity_map},
-            {
-                "made_at": made_at,
-                "nearest_disparity": textures.nearest_disparity,
-                "viewpoint": at,
-                "tile": tile,
-                **({"newest": textures.newest} if near else {}),
-            },
-        )
 
 
 def kept(views: Size, size: Size, largest: int, most_bytes: int) -> tuple[list[int], list[int]]:
@@ -194,4 +200,4 @@ def spread_order(positions: npt.NDArray[np.float64]) -> list[int]:
 
 
 def _in_8_bits(view: npt.NDArray[np.generic]) -> npt.NDArray[np.uint8]:
-    return view if view.dtype == np.uint8 else to_uint8(as_float(view))
+    return np.asarray(view, np.uint8) if view.dtype == np.uint8 else to_uint8(as_float(view))

@@ -11,7 +11,7 @@ from app.state import Look
 
 def shown_size(size: Size, look: Look) -> Size:
     """(width, height) of what this look shows of a light field of that size."""
-    return (2 * size[0], 2 * size[1]) if look is Look.WARPED_ALL else size
+    return look.tiles[0] * size[0], look.tiles[1] * size[1]
 
 
 def sampling(scale: float) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import moderngl
 import numpy as np
@@ -24,6 +25,8 @@ _COARSE = 12  # views, as in refocus_coarse.frag
 _MOST = 16  # views of a chunk, as in refocus_row.frag
 _READS_PER_FRAME = 5_000_000  # of pixels, about a millisecond for each million where two cores of a processor draw
 _TAPS = 4
+
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Refocused:
         self._sums: _Sums | None = None
         self._summing: tuple[object, ...] = ()  # what is being, or has been, summed up
         self._waiting: list[_Chunk] = []
-        self.unfinished = False
+        self.words = ""  # which views are summed up
 
     def set_views(self, views: npt.NDArray[np.generic], dark: frozenset[tuple[int, int]]) -> None:
         """Take the captured views (V, U, H, W, 3), of which `dark` ones, by row and column, are left out."""
@@ -72,14 +75,14 @@ class Refocused:
             self._synthesized.release()
             self._synthesized = None
 
-    def advance(self, wanted: Wanted) -> None:
-        """Do the part of one frame."""
+    def advance(self, wanted: Wanted) -> bool:
+        """Do the part of one frame; whether more is to be done in the next."""
         gathered = self.gathered(wanted.captured)
         gathered.fill()
         self._begin(wanted, gathered)
         if gathered.complete and self._waiting:
             self._sum_up(gathered)
-        self.unfinished = not gathered.complete or bool(self._waiting)
+        return not gathered.complete or bool(self._waiting)
 
     def picture(self, wanted: Wanted, tone: Tone) -> moderngl.Texture | None:
         """The best picture there is by now, or None where no view is there yet."""
@@ -127,6 +130,7 @@ class Refocused:
             return
         self._summing = summing
         self._waiting = _chunks(wanted, gathered, self._chunk_size) if gathered.complete else []
+        self.words = gathered.words(int(np.count_nonzero(_weights(wanted, gathered))))
         self._at_hand.sum_target.clear()
 
     @property
@@ -237,5 +241,5 @@ def _chunks(wanted: Wanted, gathered: Gathered, most: int) -> list[_Chunk]:
     return chunks
 
 
-def _padded(values: Sequence[object], filler: object, length: int) -> tuple[object, ...]:
+def _padded(values: Sequence[_Value], filler: _Value, length: int) -> tuple[_Value, ...]:
     return (*values, *[filler] * (length - len(values)))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from app.commands import around, comparing, exporting, inside, looking, moving, program, tabs, tones, zooming
+from app.commands import around, comparing, exporting, focusing, inside, looking, moving, program, tabs, tones, zooming
 from app.commands.kinds import (
     COMPARING,
     EXPORTING,
+    FOCUSING,
     INSIDE,
     LOOKING,
     MOVING,
@@ -27,6 +28,7 @@ __all__ = [
     "COMMANDS",
     "COMPARING",
     "EXPORTING",
+    "FOCUSING",
     "GESTURES",
     "INSIDE",
     "LOOKING",
@@ -53,6 +55,7 @@ COMMANDS: dict[str, Command] = {
     **moving.COMMANDS,
     **zooming.COMMANDS,
     **comparing.COMMANDS,
+    **focusing.COMMANDS,
     **tabs.COMMANDS,
     **exporting.COMMANDS,
     **around.COMMANDS,
@@ -62,6 +65,7 @@ COMMANDS: dict[str, Command] = {
 # What the mouse does, for the F1 page.
 GESTURES: tuple[tuple[str, str, str], ...] = (
     (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
+    (FOCUSING, "Shift + click", "Focus on what is under the cursor"),
     (ZOOMING, "Wheel", "Zoom about the cursor"),
     (ZOOMING, "Right drag, Space + drag", "Move the picture"),
     (EXPORTING, "Right click in the pad", "Add or remove a key frame"),

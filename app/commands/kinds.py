@@ -23,6 +23,9 @@ COMPARING = "Comparing"
 EXPORTING = "Export"
 
 
+FOCUSING = "Focus, slices, stereo"
+
+
 class Action(Enum):
     """What the panels ask of the program, beyond the view state."""
 

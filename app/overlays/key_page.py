@@ -5,11 +5,24 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app import theme
-from app.commands import COMMANDS, COMPARING, EXPORTING, GESTURES, INSIDE, LOOKING, MOVING, PROGRAM, TONES, ZOOMING, Context
+from app.commands import (
+    COMMANDS,
+    COMPARING,
+    EXPORTING,
+    FOCUSING,
+    GESTURES,
+    INSIDE,
+    LOOKING,
+    MOVING,
+    PROGRAM,
+    TONES,
+    ZOOMING,
+    Context,
+)
 from app.geometry import Rect
 from app.widgets import CARD, card, em, font, text, tooltip, wrapped
 
-_GROUPS = (LOOKING, INSIDE, TONES, COMPARING, MOVING, ZOOMING, EXPORTING, PROGRAM)
+_GROUPS = (LOOKING, INSIDE, TONES, FOCUSING, COMPARING, MOVING, ZOOMING, EXPORTING, PROGRAM)
 
 
 def key_page(area: Rect, context: Context, fonts: theme.Fonts) -> None:
@@ -21,7 +34,7 @@ def key_page(area: Rect, context: Context, fonts: theme.Fonts) -> None:
     with card("keys", area, (0.5, 0.5), width, CARD & ~imgui.WindowFlags_.no_scrollbar.value):
         with font(fonts.bold, theme.LARGE):
             text("Keys")
-        columns = ((LOOKING, INSIDE, TONES), (COMPARING, MOVING, ZOOMING, EXPORTING, PROGRAM)) if wide else (_GROUPS,)
+        columns = ((LOOKING, INSIDE, TONES, FOCUSING), (COMPARING, MOVING, ZOOMING, EXPORTING, PROGRAM)) if wide else (_GROUPS,)
         inner = width - 2 * imgui.get_style().window_padding.x - imgui.get_style().scrollbar_size
         flags = imgui.TableFlags_.sizing_stretch_same.value
         if imgui.begin_table("groups", len(columns), flags, ImVec2(inner, 0)):

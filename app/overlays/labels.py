@@ -11,7 +11,7 @@ from app.geometry import Rect
 from app.overlays import comparison
 from app.readout import Readout
 from app.state import Look, Step, ViewState
-from app.widgets import PASSIVE, button, card, em, packed, wrapped
+from app.widgets import PASSIVE, button, card, em, number, packed, wrapped
 from lfcore.lightfield import is_extrapolated
 
 
@@ -26,6 +26,8 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
         labels.append(("Captured view", theme.GOOD))
     elif state.look is not Look.SYNTHESIS:
         labels.append((comparison.own_name(state, readout), theme.TEXT))
+    if state.look is Look.REFOCUS:
+        labels.append((_focus_words(state, readout), theme.TEXT_SOFT))
     if is_extrapolated(state.u, state.v):
         labels.append(("Extrapolated", theme.WARNING))
     if state.captured and state.look is Look.SYNTHESIS and readout.captured_here is None:
@@ -45,6 +47,11 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
         )
         brush.add_text(ImVec2(x + pad_x, top + pad_y), packed(colour), words)
         x += size.x + 2 * pad_x + em() * 0.5
+
+
+def _focus_words(state: ViewState, readout: Readout) -> str:
+    summed = f", {readout.focus.summed}" if readout.focus.summed else ""
+    return f"at {number(state.focusing.focus, 2)} px{summed}"
 
 
 def missing(area: Rect, context: Context, readout: Readout) -> None:
