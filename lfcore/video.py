@@ -42,7 +42,8 @@ class _Kind:
 
 
 _KINDS = {
-    ".mp4": _Kind("mp4", "libx264", "yuv420p", {"crf": "18", "preset": "medium"}, {"movflags": "+faststart"}),
+    # One thread: with more, the same frames do not always give the same file; it is quick beside the networks.
+    ".mp4": _Kind("mp4", "libx264", "yuv420p", {"crf": "18", "preset": "medium", "threads": "1"}, {"movflags": "+faststart"}),
     ".webm": _Kind("webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0", "cpu-used": "4", "row-mt": "1"}),
     # WebP is given RGB, since its own conversion to YUV is the one that its readers undo.
     ".webp": _Kind("webp", "libwebp_anim", "bgra", {"quality": "85"}, counts_plays=True),
@@ -109,9 +110,7 @@ def _converter(kind: _Kind, first: ByteArray) -> Callable[[ByteArray], av.VideoF
     return _to_bt709 if kind.pixels == "yuv420p" else _to_bgra
 
 
-def _add_stream(
-    container: av.container.OutputContainer, kind: _Kind, sample: av.VideoFrame, rate: Fraction
-) -> av.VideoStream:
+def _add_stream(container: av.container.OutputContainer, kind: _Kind, sample: av.VideoFrame, rate: Fraction) -> av.VideoStream:
     stream = container.add_stream(kind.codec, rate=rate, options=kind.options)
     assert isinstance(stream, av.VideoStream)
     context = stream.codec_context

@@ -107,6 +107,16 @@ def test_a_gif_repeats_for_ever(tmp_path: Path) -> None:
     assert data[extension : extension + 5] == bytes([3, 1, 0, 0, 0])
 
 
+def test_the_same_frames_give_the_same_file(tmp_path: Path) -> None:
+    texture = np.random.default_rng(0).integers(0, 256, (96, 128, 3), dtype=np.uint8)
+    frames = [np.roll(texture, 3 * k, axis=1) for k in range(20)]
+    files = []
+    for count in range(3):
+        write_video(tmp_path / f"{count}.mp4", iter(frames), 25)
+        files.append((tmp_path / f"{count}.mp4").read_bytes())
+    assert files[0] == files[1] == files[2]
+
+
 def test_an_mp4_starts_with_its_index(tmp_path: Path) -> None:
     path = tmp_path / "v.mp4"
     write_video(path, movie(), 25)
