@@ -202,7 +202,8 @@ def test_the_table_of_models_fills_while_it_is_looked_at_and_nothing_is_computed
         return {name: None if score is None else score.psnr for name, score in controller.readout(None).compared.table}
 
     program.until(lambda: table().get("second") is not None)
-    expected = {name: k16(truth(0.5, 0.5) + made.excess, light_field().view(1, 1)).psnr for name, made in program.models.items()}
+    captured = light_field().view(1, 1)
+    expected = {name: k16(truth(0.5, 0.5) + made.excess, captured).psnr for name, made in program.models.items()}
     program.until(lambda: bool(controller.messages))  # the third cannot be loaded
     assert table() == pytest.approx({**expected, "broken": None}, abs=1e-6)
     assert controller.picture is not None and controller.picture.synthesis.model == "first"
