@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import stat
+import struct
 import tempfile
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -19,6 +21,10 @@ from lfcore.lightfield import CORNERS, FloatArray
 
 IMAGE_EXTENSIONS = (".png", ".tif", ".tiff", ".exr")
 DISPARITY_EXTENSIONS = (".tif", ".tiff", ".exr")
+
+_PNG_SIGNATURE = 8  # bytes
+_PNG_CHUNK = 12  # bytes of a chunk beside its data
+_FULL_DISK = 2**20  # bytes; with less room than this a failure to write is one of room
 
 
 def check_target(path: str | os.PathLike[str], extensions: Collection[str]) -> Path:
@@ -155,10 +161,27 @@ def _opened(target: Path, spec: oiio.ImageSpec) -> Iterator[oiio.ImageOutput]:
             yield output
         finally:
             closed = output.close()
-        if not closed:
+        # OpenImageIO does not notice that a PNG has not found room.
+        if not closed or (target.suffix.lower() == ".png" and not _is_whole_png(temporary)):
             raise _cannot_write(target, output)
 
 
+def _is_whole_png(path: Path) -> bool:
+    """Whether the chunks of a PNG follow one another up to the last one, which ends the file."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        end = len(file.read(_PNG_SIGNATURE))
+        while end + _PNG_CHUNK <= size:
+            file.seek(end)
+            length, kind = struct.unpack(">I4s", file.read(8))
+            end += _PNG_CHUNK + length
+            if kind == b"IEND":
+                return end == size
+    return False
+
+
 def _cannot_write(target: Path, output: oiio.ImageOutput) -> OutputError:
-    reason = output.geterror() or "the disk may be full"
+    reason = output.geterror()
+    if not reason or shutil.disk_usage(target.parent).free < _FULL_DISK:
+        reason = "the disk is full"
     return OutputError(f"Cannot write {target}: {reason}; choose another place or make room there.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -205,4 +206,6 @@ def _as_output_error(target: Path) -> Iterator[None]:
     try:
         yield
     except av.error.FFmpegError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+            raise OutputError(f"Cannot write {target}: {error.strerror}; choose another place or make room there.") from error
         raise OutputError(f"Cannot write {target}: {error.strerror} (encoder); try another kind of file.") from error

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -121,6 +123,39 @@ def test_a_folder_that_vanishes_is_told(tmp_path: Path) -> None:
 
     with pytest.raises(OutputError, match="frames"):
         export_sweep(frames_of(SweepPlan(LINE, 4)), Target(folder, Kind.PNG), vanish)
+    assert list(tmp_path.iterdir()) == []
+
+
+FULL = """
+import resource, sys
+import numpy as np
+from pathlib import Path
+from lfcore.errors import OutputError
+from lfcore.export import write_image, write_rows
+from lfcore.video import write_video
+noise = np.random.default_rng(0).integers(0, 256, (200, 300, 3), dtype=np.uint8)
+resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+for name in ("a.png", "a.tif", "a.exr", "rows.png", "a.mp4", "a.webm", "a.webp", "a.gif"):
+    target = Path(sys.argv[1]) / name
+    try:
+        if target.stem == "rows":
+            write_rows(target, noise.shape[:2], (noise[top : top + 20] for top in range(0, 200, 20)))
+        elif target.suffix in (".png", ".tif", ".exr"):
+            write_image(target, noise / np.float32(255))
+        else:
+            write_video(target, (np.roll(noise, shift, 1) for shift in range(30)), 10)
+    except OutputError as error:
+        print(name, "make room there" in str(error))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of the size of files")
+def test_files_that_find_no_room_are_told_and_leave_nothing(tmp_path: Path) -> None:
+    root = Path(__file__).parents[1]
+    done = subprocess.run([sys.executable, "-c", FULL, str(tmp_path)], cwd=root, capture_output=True, text=True, timeout=120)
+    assert done.stdout.split("\n")[:-1] == [
+        f"{name} True" for name in ("a.png", "a.tif", "a.exr", "rows.png", "a.mp4", "a.webm", "a.webp", "a.gif")
+    ], done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
