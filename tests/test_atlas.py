@@ -1,4 +1,4 @@
-"""Many small pictures in one texture."""
+"""Many small pictures in a few textures."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def picture(seed: int, height: int = 7, width: int = 5) -> np.ndarray:
 def read(gl: Any, placed: Placed) -> np.ndarray:
     """The pixels at that place, straight from the texture."""
     side = PLACE * module._ACROSS
-    held = gl.external_texture(placed.texture, (side, side), 3, 0, "f1")
-    whole = np.frombuffer(held.read(alignment=1), np.uint8).reshape(side, side, 3)
+    held = gl.external_texture(placed.texture, (side, side), 4, 0, "f1")
+    whole = np.frombuffer(held.read(alignment=1), np.uint8).reshape(side, side, 4)[..., :3]
     x, y = round(placed.first[0] * side - 0.5), round(placed.first[1] * side - 0.5)
     assert (round(placed.last[0] * side + 0.5) - x, round(placed.last[1] * side + 0.5) - y) == (placed.width, placed.height)
     return whole[y : y + placed.height, x : x + placed.width]
@@ -32,6 +32,7 @@ def read(gl: Any, placed: Placed) -> np.ndarray:
 @pytest.fixture
 def atlas(gl: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Atlas]:
     monkeypatch.setattr(module, "_ACROSS", 2)
+    monkeypatch.setattr(module, "_SHEETS", 2)
     made = Atlas(gl)
     yield made
     made.release()
@@ -39,7 +40,7 @@ def atlas(gl: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Atlas]:
 
 
 def test_pictures_lie_where_it_is_said_and_those_shown_longest_ago_make_room(gl: moderngl.Context, atlas: Atlas) -> None:
-    sizes = [(7, 5), (1, 1), (LONGEST_SIDE, 3), (3, LONGEST_SIDE)]
+    sizes = [(7, 5), (1, 1), (LONGEST_SIDE, 3), (3, LONGEST_SIDE), (9, 9), (2, 3), (4, 4), (5, 5)]
     pictures = [picture(seed, *size) for seed, size in enumerate(sizes)]
     places = [atlas.place(seed, each) for seed, each in enumerate(pictures)]
     for place, each in zip(places, pictures, strict=True):
@@ -47,11 +48,11 @@ def test_pictures_lie_where_it_is_said_and_those_shown_longest_ago_make_room(gl:
         assert (read(gl, place) == each).all()
     assert atlas.place(0, pictures[0]) == places[0]
     new = picture(9)
-    fifth = atlas.place(4, new)  # in the place of 1
-    assert fifth is not None
+    ninth = atlas.place(8, new)  # in the place of 1
+    assert ninth is not None
     assert places[1] is not None
-    assert fifth.first == places[1].first
-    assert (read(gl, fifth) == new).all()
+    assert (ninth.texture, ninth.first) == (places[1].texture, places[1].first)
+    assert (read(gl, ninth) == new).all()
     assert places[0] is not None
     assert (read(gl, places[0]) == pictures[0]).all()
 

@@ -1,4 +1,4 @@
-"""Many small pictures in one texture, for lists with pictures: those shown last stay."""
+"""Many small pictures in a few textures, for lists with pictures: those shown last stay."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ import numpy.typing as npt
 
 from app.desk import Placed
 
-PLACE = 192  # px a side: room for the largest glance (lfcore.formats.glance)
-_ACROSS = 16  # 256 pictures, 28 MB
+PLACE = 192  # px a side of a place: room for the largest glance (lfcore.formats.glance)
+_ACROSS = 4  # places a side of a sheet: one takes 2 MB, and less than a frame to make
+_SHEETS = 16  # 256 pictures
 _UPLOADS = 12  # a frame: each takes a tenth of a millisecond
+# imgui's own texture has four components too: software rasterisers compile its shader once for each kind of texture.
+_COMPONENTS = 4
 
 
 class Atlas:
-    """A texture of square places, made when the first picture comes. The GL context must be current in all methods."""
+    """Sheets of square places, made when they are needed. The GL context must be current in all methods."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
-        self._texture: moderngl.Texture | None = None
-        self._across = 0  # places a side
+        self._sheets: list[moderngl.Texture] = []
         self._placed: OrderedDict[Hashable, tuple[int, Placed]] = OrderedDict()  # the one shown longest ago first
         self._uploads = 0
 
@@ -38,35 +40,37 @@ class Atlas:
         if self._uploads >= _UPLOADS:
             return None
         self._uploads += 1
-        texture = self._texture if self._texture is not None else self._make()
         index = self._free_place()
-        row, column = divmod(index, self._across)
-        x, y = column * PLACE, row * PLACE
-        height, width = picture.shape[:2]
-        texture.write(np.ascontiguousarray(picture), viewport=(x, y, width, height))
-        # Half a pixel inside, so that nothing of the neighbours is mixed in.
-        first = ((x + 0.5) / texture.width, (y + 0.5) / texture.height)
-        last = ((x + width - 0.5) / texture.width, (y + height - 0.5) / texture.height)
-        placed = Placed(texture.glo, first, last, width, height)
+        placed = self._put(index, picture)
         self._placed[name] = (index, placed)
         return placed
 
     def release(self) -> None:
         """Give the memory of the graphics back, and forget all pictures."""
-        if self._texture is not None:
-            self._texture.release()
-            self._texture = None
+        for sheet in self._sheets:
+            sheet.release()
+        self._sheets.clear()
         self._placed.clear()
 
     def _free_place(self) -> int:
-        if len(self._placed) < self._across**2:
+        if len(self._placed) < _SHEETS * _ACROSS**2:
             return len(self._placed)
         return self._placed.popitem(last=False)[1][0]
 
-    def _make(self) -> moderngl.Texture:
-        largest = int(self._context.info["GL_MAX_TEXTURE_SIZE"])
-        self._across = min(_ACROSS, largest // PLACE)
-        side = self._across * PLACE
-        self._texture = self._context.texture((side, side), 3, alignment=1)
-        self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        return self._texture
+    def _put(self, index: int, picture: npt.NDArray[np.uint8]) -> Placed:
+        number, place = divmod(index, _ACROSS**2)
+        if number == len(self._sheets):
+            side = _ACROSS * PLACE
+            self._sheets.append(self._context.texture((side, side), _COMPONENTS))
+            self._sheets[-1].filter = (moderngl.LINEAR, moderngl.LINEAR)
+        sheet = self._sheets[number]
+        row, column = divmod(place, _ACROSS)
+        x, y = column * PLACE, row * PLACE
+        height, width = picture.shape[:2]
+        pixels = np.full((height, width, _COMPONENTS), 255, np.uint8)
+        pixels[..., :3] = picture
+        sheet.write(pixels, viewport=(x, y, width, height))
+        # Half a pixel inside, so that nothing of the neighbours is mixed in.
+        first = ((x + 0.5) / sheet.width, (y + 0.5) / sheet.height)
+        last = ((x + width - 0.5) / sheet.width, (y + height - 0.5) / sheet.height)
+        return Placed(sheet.glo, first, last, width, height)

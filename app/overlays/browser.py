@@ -69,8 +69,9 @@ def _tiles(folder: Folder, context: Context, shelf: Shelf) -> None:
     """The tiles in rows; only those in sight are drawn, so that thousands scroll as fast as ten."""
     desk, members = context.state.desk, folder.members
     imgui.begin_child("tiles", ImVec2(0, 0))
-    one, gap = tiles.size(), 0.4 * em()
-    columns = max(int((imgui.get_content_region_avail().x + gap) // (one.x + gap)), 1)
+    one, gap, room = tiles.size(), 0.4 * em(), imgui.get_content_region_avail().x
+    columns = max(int((room + gap) // (one.x + gap)), 1)
+    step = one.x + (room - columns * one.x) / max(columns - 1, 1)  # from column to column, so that they fill the width
     rows = -(-len(members) // columns)
     moved = _moved(columns, imgui.get_window_height() // (one.y + gap), len(members))
     desk.chosen = min(max(desk.chosen + moved, 0), len(members) - 1)
@@ -82,7 +83,7 @@ def _tiles(folder: Folder, context: Context, shelf: Shelf) -> None:
     chosen = None
     for index in range(first * columns, min((last + 1) * columns, len(members))):
         row, column = divmod(index, columns)
-        imgui.set_cursor_pos(ImVec2(start.x + column * (one.x + gap), start.y + row * (one.y + gap)))
+        imgui.set_cursor_pos(ImVec2(start.x + column * step, start.y + row * (one.y + gap)))
         path = members[index]
         if tiles.tile(path, shelf.thumbnail(path), index == desk.chosen):
             chosen = index
