@@ -109,10 +109,10 @@ class Interface:
         """As Controller.next_frame_in, but 0 also while the picture becomes better with every frame."""
         return 0.0 if self._canvas.unfinished else self.controller.next_frame_in
 
-    def warm_up(self) -> None:
-        """Make the graphics ready for the first light field, while it is being opened."""
+    def warm_up(self, target: Target) -> None:
+        """Make the graphics ready for the first light field, while it is being opened; the target is drawn over."""
         if self._light_field is None:
-            self._canvas.warm_up()
+            self._canvas.warm_up(target)
 
     def shutdown(self) -> None:
         """Give imgui's GL objects back; the context must still be current."""

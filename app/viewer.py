@@ -214,7 +214,7 @@ class _Window:
 
     def warm_up(self) -> None:
         """See Interface.warm_up."""
-        self._at_hand.warm_up()
+        self._at_hand.warm_up(Target(self._target, glfw.get_framebuffer_size(self._window)))
 
     def run(self) -> None:
         """Draw frames as they are needed until the window is closed."""

@@ -92,14 +92,15 @@ class Canvas:
         self.clear()
         self._makers = _Makers.of(self.context, self.passes, Textures(self.context, corners, self._picture_type))
 
-    def warm_up(self) -> None:
-        """Run every pass of the moving picture once on a made-up light field; there must be no other.
+    def warm_up(self, target: Target) -> None:
+        """Run every pass of the moving picture once on a made-up light field, into the target; there must be no other.
 
         Software rasterisers compile a shader when it is first run on certain kinds of texture, which can take half a second:
-        the hand would feel it in its first movement.
+        the hand would feel it in its first movement. Sides that are powers of two are a kind of their own.
         """
-        self.set_light_field(np.zeros((4, 2, 2, 3), np.uint8))
-        image, pixels, disparity = np.zeros((2, 2, 3), np.float32), np.zeros((2, 2, 4), np.uint8), np.zeros((2, 2), np.float32)
+        size = (3, 5)
+        self.set_light_field(np.zeros((4, *size, 3), np.uint8))
+        image, pixels, disparity = np.zeros((*size, 3), np.float32), np.zeros((*size, 4), np.uint8), np.zeros(size, np.float32)
         here, near, far = (0.5, 0.5), (0.5, 0.45), (0.5, 0.1)
         self.prepare(Frame(Look.SYNTHESIS, here))
         for share in (0.5, 1.0):  # fading in over nothing, then over the one before
@@ -107,6 +108,8 @@ class Canvas:
             for viewpoint in (here, near, far):
                 self.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
         self.prepare(Frame(Look.SYNTHESIS, near, share=0.5))
+        for scale in (0.5, 1.0, 2.0):
+            self.draw(Frame(Look.SYNTHESIS, here), target, Rect(0, 0, *size), Placement(scale, (0.0, 0.0)))
         self.clear()
 
     def clear(self) -> None:
