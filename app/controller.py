@@ -151,6 +151,7 @@ class Controller:
         if self.state.model not in ("", self._model):
             self._change_model(self.state.model)
         self._collect()
+        self.exports.follow_dialog(self.state.export)
         if self.light_field is None:
             return
         self._play(now)
@@ -289,8 +290,12 @@ class Controller:
         if self.state.dragging:
             choices.playing = False
         stop = choices.stop_at(now)
-        if stop is not None:
-            self.state.move_to(stop.u, stop.v)
+        if stop is None:
+            return
+        self.state.move_to(stop.u, stop.v)
+        if stop.focus is not None:
+            self.state.focusing = replace(self.state.focusing, aperture=choices.aperture)
+            self.state.refocus_at(stop.focus)
             if stop.focus is not None:
                 self.state.refocus_at(stop.focus)
 

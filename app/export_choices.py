@@ -69,7 +69,7 @@ class ExportChoices:
     key_frames: tuple[Stop, ...] = ()
     closed: bool = True
     refocus: bool = False
-    focus: tuple[float, float] = (0.0, 0.0)  # of shapes: from, to; of key frames the first is that of the next one
+    focus: tuple[float, float] = (0.0, 0.0)  # of shapes: from, to; of quilts the first is the screen's plane
     aperture: float = 1.0
     frames: int = 120
     fps: float = 30.0
@@ -129,10 +129,10 @@ class ExportChoices:
 
     # Key frames.
 
-    def add_key_frame(self, u: float, v: float) -> None:
+    def add_key_frame(self, u: float, v: float, focus: float) -> None:
         """Put one more at the end of the path, which becomes one of key frames."""
         self.shape = KEY_FRAMES
-        self.key_frames = (*self.key_frames, Stop(u, v, self.focus[0]))
+        self.key_frames = (*self.key_frames, Stop(u, v, focus))
 
     def remove_last_key_frame(self) -> None:
         """Take the last one away again, if there is one."""
@@ -145,11 +145,11 @@ class ExportChoices:
                 return number
         return None
 
-    def add_or_remove_key_frame(self, u: float, v: float) -> None:
+    def add_or_remove_key_frame(self, u: float, v: float, focus: float) -> None:
         """Take away the key frame under this place of the pad, or else put one there."""
         number = self.key_frame_at(u, v) if self.shape == KEY_FRAMES else None
         if number is None:
-            self.add_key_frame(u, v)
+            self.add_key_frame(u, v, focus)
         else:
             self.key_frames = (*self.key_frames[:number], *self.key_frames[number + 1 :])
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from app import dialogs
 from app.engine import ModelChoice
 from app.export_choices import ExportChoices
 from app.export_requests import CancelExport, ExportAction, ExportRequest
@@ -29,7 +30,9 @@ class Exports:
     def __init__(self, models: Mapping[str, ModelChoice], wake: Callable[[], None], hand_waits: Callable[[], bool]) -> None:
         self._models = models
         self._queue = ExportQueue(wake)
+        self._wake = wake
         self._hand_waits = hand_waits
+        self._dialog: dialogs.Dialog | None = None  # for the folder, while it is open
         self._made: dict[str, Synthesizer] = {}  # in the queue's thread; the one used last
 
     @property
@@ -48,6 +51,8 @@ class Exports:
             self._queue.cancel(request.number)
         elif request is ExportAction.CLEAR:
             self._queue.clear()
+        elif request is ExportAction.CHOOSE_FOLDER:
+            self._ask_folder(choices)
         elif request is ExportAction.SAVE_PATH:
             save_plan(plan_file(choices), choices.plan())
         elif request is ExportAction.EXPORT and light_field is not None:
@@ -59,9 +64,32 @@ class Exports:
 
         self._queue.add(picture_job(pixels, Path(choices.folder).expanduser(), stem))
 
+    def follow_dialog(self, choices: ExportChoices) -> None:
+        """Take the folder that was chosen in the dialog, once it has been."""
+        answer = self._dialog.poll() if self._dialog is not None else None
+        if answer is None:
+            return
+        self._dialog = None
+        if answer.path is not None:
+            choices.folder = str(answer.path)
+
     def stop(self, timeout: float) -> None:
         """End the thread; what is not finished is given up."""
         self._queue.stop(timeout)
+
+    def _ask_folder(self, choices: ExportChoices) -> None:
+        if self._dialog is not None:
+            return  # one is open already
+        if not dialogs.available():
+            raise InputError("This system has no dialog for folders (zenity or kdialog): type the folder's path.")
+        start = Path(choices.folder).expanduser()
+        question = dialogs.Question(dialogs.Purpose.OPEN_FOLDER, "Folder for exports", start)
+        try:
+            self._dialog = dialogs.ask(question, self._wake)
+        except OSError as error:
+            raise InputError(
+                f"The dialog for folders could not be opened ({error.strerror}): type the folder's path."
+            ) from error
 
     def _begin(self, choices: ExportChoices, light_field: LightField, model: str) -> None:
         from app.export_jobs import Source, chosen_job

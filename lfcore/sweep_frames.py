@@ -32,6 +32,7 @@ MAX_SIDE = 16_383  # px of a frame: the most that a WebP, and about what H.264, 
 _CACHE_BYTES = 256 * 2**20  # of past syntheses: a way back meets those of the way there
 _RANGE_STRIDE = 2  # every second row and column tell a range well enough
 _ENOUGH_CAPTURED = 5  # views a side: fewer than these leave ghosts when they are summed
+_GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
 _SUMMED = 9  # synthesized views a side, where the captured ones are too few
 
 
@@ -55,8 +56,8 @@ class SweepFrames:
     """The frames of a plan on one light field. `synthesize` is asked for each view, in the thread that asks for the frame.
 
     Of error frames the viewpoint is that of the nearest captured view, since elsewhere nobody knows the truth. Refocused frames
-    are the mean of the captured views within the aperture where there are 5 x 5 or more, else of 9 x 9 synthesized ones. Raises
-    InputError where the light field cannot give what the plan shows.
+    are the mean of the captured views within the aperture where there are 5 x 5 or more and neighbours differ by no more than
+    3 px of disparity, else of 9 x 9 synthesized ones. Raises InputError where the light field cannot give what the plan shows.
     """
 
     def __init__(self, plan: SweepPlan, light_field: LightField, synthesize: Synthesize) -> None:
@@ -158,9 +159,15 @@ class SweepFrames:
         low, high = (float(value) for value in np.percentile(values, (1, 99)))
         return low, high
 
-    @property
+    @cached_property
     def _captured_serve(self) -> bool:
-        return min(self._light_field.rows, self._light_field.columns) >= _ENOUGH_CAPTURED
+        """Whether the captured views are summed up: there are enough, so close that what is out of focus is smooth, or there
+        is no disparity by which others could be made."""
+        if self._synthesize(0.5, 0.5).disparity is None:
+            return True
+        low, high = self._disparity_range
+        fewest = min(self._light_field.rows, self._light_field.columns)
+        return fewest >= _ENOUGH_CAPTURED and (high - low) / (fewest - 1) <= _GHOST
 
     @cached_property
     def _summed(self) -> npt.NDArray[np.float64]:

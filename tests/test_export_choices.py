@@ -38,15 +38,14 @@ def test_a_plan_that_was_taken_is_the_plan(plan: SweepPlan, tmp_path: Path) -> N
 def test_key_frames_are_added_and_removed() -> None:
     choices = ExportChoices()
     choices.remove_last_key_frame()
-    choices.add_key_frame(0.25, 0.5)
-    choices.focus = (3.0, 0.0)
-    choices.add_key_frame(0.75, 0.5)
+    choices.add_key_frame(0.25, 0.5, 0.0)
+    choices.add_key_frame(0.75, 0.5, 3.0)
     assert choices.shape == KEY_FRAMES
     assert choices.path() == KeyFramePath((Stop(0.25, 0.5), Stop(0.75, 0.5)), closed=True)
     choices.refocus = True
     assert choices.path() == KeyFramePath((Stop(0.25, 0.5, 0.0), Stop(0.75, 0.5, 3.0)), closed=True)
-    choices.add_or_remove_key_frame(0.5, 0.9)
-    choices.add_or_remove_key_frame(0.76, 0.49)  # near the second
+    choices.add_or_remove_key_frame(0.5, 0.9, 0.0)
+    choices.add_or_remove_key_frame(0.76, 0.49, 0.0)  # near the second
     assert [key.u for key in choices.key_frames] == [0.25, 0.5]
     choices.remove_last_key_frame()
     assert [key.u for key in choices.key_frames] == [0.25]

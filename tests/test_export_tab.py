@@ -9,13 +9,15 @@ from typing import Any
 
 import pytest
 
+from app import dialogs
 from app.controller import Controller
+from app.dialogs import Answered, Purpose, Question
 from app.engine import Engine, ModelChoice
 from app.export_choices import KEY_FRAMES, Product
 from app.export_requests import CancelExport, ExportAction
 from app.exporting import Phase, Status
 from app.sidebar.export import progress_words
-from app.state import Tab
+from app.state import Look, Tab
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
 from lfcore.sweep_plan import ShapePath, SweepPlan, load_plan, save_plan
@@ -47,6 +49,17 @@ def test_keys_add_and_remove_key_frames_and_play(screen: Screen) -> None:
     assert export.playing
     screen.press("Ctrl+Shift+K")
     assert not export.playing
+
+
+def test_key_frames_take_the_focus_of_a_refocused_picture(screen: Screen) -> None:
+    export = screen.state.export
+    screen.press("K")
+    assert not export.refocus
+    screen.state.refocus_at(-2.5)
+    screen.state.focusing = replace(screen.state.focusing, aperture=0.75)
+    screen.press("K")
+    assert (export.refocus, export.aperture) == (True, 0.75)
+    assert [key.focus for key in export.key_frames] == [0.0, -2.5]
 
 
 def test_keys_ask_for_exports(screen: Screen) -> None:
@@ -143,8 +156,8 @@ def test_an_export_is_made_and_told(controller: Controller, tmp_path: Path) -> N
 
 def test_a_saved_path_comes_back_when_it_is_opened(controller: Controller, tmp_path: Path) -> None:
     export = controller.state.export
-    export.add_key_frame(0.25, 0.5)
-    export.add_key_frame(1, 1)
+    export.add_key_frame(0.25, 0.5, 0.0)
+    export.add_key_frame(1, 1, 0.0)
     export.name = "mine"
     plan = export.plan()
     controller.exports.fulfil(ExportAction.SAVE_PATH, export, controller.light_field, "truth")
@@ -178,9 +191,45 @@ def test_the_preview_moves_the_viewpoint_until_it_is_dragged(controller: Control
     assert controller.viewpoint == (0.9, 0.9)
 
 
+def test_the_preview_of_a_focus_sweep_refocuses(controller: Controller) -> None:
+    export = controller.state.export
+    export.refocus, export.focus, export.aperture, export.frames, export.fps = True, (-3.0, 5.0), 0.4, 8, 1
+    export.play()
+    controller.tick(10.0)
+    controller.tick(14.0)  # a circle is back at the first focus in the end
+    focusing = controller.state.focusing
+    assert (focusing.focus, focusing.aperture, controller.state.look) == (pytest.approx(5.0), 0.4, Look.REFOCUS)
+
+
+class Dialog:
+    def __init__(self, answers: list[Answered | None]) -> None:
+        self.answers = answers
+
+    def poll(self) -> Answered | None:
+        return self.answers.pop(0)
+
+
+def test_the_folder_is_chosen_by_a_dialog(controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    export = controller.state.export
+    monkeypatch.setattr(dialogs, "available", lambda: False)
+    with pytest.raises(InputError, match="type the folder"):
+        controller.exports.fulfil(ExportAction.CHOOSE_FOLDER, export, controller.light_field, "truth")
+    asked: list[Question] = []
+    shown = Dialog([None, Answered(tmp_path / "chosen")])
+    monkeypatch.setattr(dialogs, "available", lambda: True)
+    monkeypatch.setattr(dialogs, "ask", lambda question, wake: (asked.append(question), shown)[1])
+    for _ in range(2):  # the second while the first is open
+        controller.exports.fulfil(ExportAction.CHOOSE_FOLDER, export, controller.light_field, "truth")
+    assert [(question.purpose, question.start) for question in asked] == [(Purpose.OPEN_FOLDER, tmp_path)]
+    controller.tick(1.0)
+    assert export.folder == str(tmp_path)
+    controller.tick(2.0)
+    assert export.folder == str(tmp_path / "chosen")
+
+
 def test_key_frames_stay_when_the_path_is_played(controller: Controller) -> None:
     export = controller.state.export
-    export.add_key_frame(0.1, 0.2)
+    export.add_key_frame(0.1, 0.2, 0.0)
     export.play()
     controller.tick(1.0)
     assert controller.viewpoint == (0.1, 0.2)

@@ -129,6 +129,26 @@ def test_refocused_at_its_disparity_the_scene_stays_sharp(views: int) -> None:
     assert (len(synthesizer.asked) > 30) == (views == 3)
 
 
+def test_views_far_apart_are_not_summed_up() -> None:
+    class Deep(TruthSynthesizer):
+        def synthesize(self, u: float, v: float, cancelled: object = None) -> Synthesis:
+            self.asked.append((u, v))
+            disparity = np.tile(np.linspace(-10, 10, WIDTH, dtype=np.float32), (HEIGHT, 1))  # 5 px from view to view
+            return Synthesis(u, v, self.name, truth(u, v), disparity, None, {"total": 0.0})
+
+    plan = SweepPlan(KeyFramePath((Stop(0.5, 0.5, 1.0),)), 1, aperture=0.5)
+    scene = light_field(5, 5)
+    deep = Deep()
+    SweepFrames(plan, scene, deep.synthesize).picture(0)
+    assert len(deep.asked) > 10
+    # Without a disparity the captured views serve.
+    asked: list[tuple[float, float]] = []
+    mean = MeanSynthesizer()
+    mean.set_light_field(scene)
+    SweepFrames(plan, scene, lambda u, v: (asked.append((u, v)), mean.synthesize(u, v))[1]).picture(0)
+    assert asked == [(0.5, 0.5)]
+
+
 def test_a_model_without_disparity_says_so() -> None:
     scene = light_field()
     frames = SweepFrames(SweepPlan(LINE, layer=Layer.DISPARITY), scene, remembering(scene, MeanSynthesizer()))

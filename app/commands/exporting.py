@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from app.commands.kinds import EXPORTING, Command, Context, Needs, Run, request
 from app.export_requests import ExportAction
+from app.state import Look
 
 
 def _add(context: Context) -> None:
-    context.state.export.add_key_frame(context.state.u, context.state.v)
+    """With the focus of the tab Focus; where the picture is refocused, the path is too."""
+    state = context.state
+    state.export.add_key_frame(state.u, state.v, state.focusing.focus)
+    if state.look is Look.REFOCUS:
+        state.export.refocus, state.export.aperture = True, state.focusing.aperture
 
 
 def _remove(context: Context) -> None:

@@ -102,9 +102,7 @@ def _length(choices: ExportChoices) -> None:
 def _focus(choices: ExportChoices) -> None:
     first, last = choices.focus
     limits = (-MAX_FOCUS, MAX_FOCUS)
-    if choices.shape == KEY_FRAMES:
-        first = _decimal("At", first, limits, "%.1f", "Disparity in focus at the next key frame, px from corner to corner")
-    else:
+    if choices.shape != KEY_FRAMES:
         first = _decimal("From", first, limits, "%.1f", "Disparity in focus where the path begins, px from corner to corner")
         last = _decimal("To", last, limits, "%.1f", "Disparity in focus where the path ends; closed ones go back")
     choices.focus = (first, last)
@@ -127,7 +125,10 @@ def _frames(choices: ExportChoices) -> None:
     tooltip("The display tone for dark captures: ^(1/1.5), saturation × 1.5")
     imgui.same_line(0, em() * 0.9)
     _, choices.refocus = imgui.checkbox("Focus", choices.refocus)
-    tooltip("Frames are the mean of the views within an aperture, shifted to the disparity in focus.")
+    tooltip(
+        "Frames are the mean of the views within an aperture, shifted to the disparity in focus. Key frames have that of the "
+        "tab Focus when they were added."
+    )
     if choices.refocus:
         _focus(choices)
 
@@ -158,7 +159,7 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
     models = (_SAME_MODEL, *readout.models)
     model = choice("Model", choices.model or _SAME_MODEL, models, "The model that makes the views; realtime is the fastest")
     choices.model = "" if model == _SAME_MODEL else model
-    choices.folder = _typed("Folder", choices.folder, "Where it is written")
+    _folder(context, choices)
     choices.name = _typed("Name", choices.name, "The file's name, without the ending of its kind")
     fault = choices.fault
     imgui.begin_disabled(bool(fault))
@@ -167,8 +168,22 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
     with font(fonts.regular, theme.SMALL):
         if fault:
             wrapped(fault, theme.WARNING)
+        elif choices.target_path.is_file():
+            wrapped("Replaces the file of that name", theme.WARNING)
         elif choices.product is Product.SWEEP:
             text(f"{choices.frames / choices.fps:.1f} s", theme.TEXT_FAINT)
+
+
+def _folder(context: Context, choices: ExportChoices) -> None:
+    ask = "\N{HORIZONTAL ELLIPSIS}"
+    room = imgui.calc_text_size(ask).x + 2 * imgui.get_style().frame_padding.x + imgui.get_style().item_spacing.x
+    _labelled("Folder", room)
+    _, choices.folder = imgui.input_text("##Folder", choices.folder)
+    tooltip("Where it is written")
+    imgui.same_line()
+    if imgui.button(f"{ask}##folder"):
+        context.requests.append(ExportAction.CHOOSE_FOLDER)
+    tooltip("Choose the folder")
 
 
 def _queue(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -227,11 +242,12 @@ def _chosen(label: str, value: _Chosen, kind: type[_Chosen], hint: str) -> _Chos
     return kind(choice(label, value.value, [each.value for each in kind], hint))
 
 
-def _labelled(label: str) -> None:
+def _labelled(label: str, room: float = 0.0) -> None:
+    """The label of a field that fills the line, but for `room` at its end."""
     imgui.align_text_to_frame_padding()
     text(label, theme.TEXT_SOFT)
     imgui.same_line(_LABEL * em())
-    imgui.set_next_item_width(imgui.get_content_region_avail().x)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - room)
 
 
 def _whole(label: str, value: int, limits: tuple[int, int], hint: str) -> int:

@@ -26,7 +26,7 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
         state.drag_to(u, v)
     exporting = state.tab is Tab.EXPORT or state.export.playing
     if exporting and imgui.is_item_clicked(imgui.MouseButton_.right):
-        state.export.add_or_remove_key_frame(u, v)
+        state.export.add_or_remove_key_frame(u, v, state.focusing.focus)
     if exporting and not imgui.is_item_active():
         tooltip("Drag to move the viewpoint. Line: the path; a right click adds or removes a key frame.  (K, Shift+K)")
     elif not imgui.is_item_active():
