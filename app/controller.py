@@ -26,6 +26,8 @@ from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
 from app.readout import Compared, Readout
+from app.samples import Samples
+from app.sampling import Sampler
 from app.scoreboard import Scoreboard
 from app.state import CARRIED_NEAR, Grid, Look, Step, Tab, ViewState, carried_share
 from lfcore.cache import rounded
@@ -73,6 +75,7 @@ class Controller:
         self._models = models or {}
         for name, choice in self._models.items():
             engine.know(name, choice.make)
+        self._sampler = Sampler()
         self.comparing = Comparing(engine, wake)
         self._scoreboard = Scoreboard(engine, self._models)
         self.exports = Exports(self._models, wake, self._hand_waits)
@@ -264,6 +267,7 @@ class Controller:
             captured_here=self.captured_here,
             compared=self._compared(),
             focus=self._focus_facts(),
+            samples=self._samples(),
             captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
             value_under_cursor=self._value_under_cursor(),
             exports=self.exports.statuses,
@@ -519,6 +523,14 @@ class Controller:
             self._scoreboard.table(light_field, self.viewpoint) if self._wants_table else (),
             self._scoreboard.views,
         )
+
+    def _samples(self) -> Samples | None:
+        """The values behind the picture, where it has been made for exactly the viewpoint."""
+        if self.light_field is None or self.picture is None or _viewpoint_of(self.picture) != self.viewpoint:
+            return None
+        source = self.state.comparison.source
+        partner = self.comparing.answer if source is Source.MODEL else None
+        return self._sampler.take(self.light_field, self.picture, partner, source, self._shows_captured)
 
     def _wanted_later(self, light_field: LightField) -> Wish | None:
         """What there is to do while the hand rests on a finished picture."""

@@ -43,11 +43,13 @@ def draw(
     if readout.grid is not None:
         panes = arrange(state, area)
         picture.draw(area, panes, state, size, scale)
+        overlays.pixels(panes, state, readout, size, scale)
         overlays.names(panes, state, readout)
         overlays.cross_hairs(panes, state, size)
         overlays.wipe_handle(area, panes, state)
         overlays.notices(area, state, readout)
         overlays.legend(area, state, readout)
+        overlays.inspector(area, state, readout)
         if not covered:
             overlays.missing(area, context, readout)
     elif readout.captions:

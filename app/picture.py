@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from app.geometry import Point, Rect, Size, pan_by, place, zoom_about
+from app.geometry import Point, Rect, Size, Zoom, fit_scale, pan_by, place, zoom_about
 from app.panes import Pane, under
 from app.state import Look, ViewState
 from app.widgets import FIXED, window
@@ -60,9 +60,13 @@ def _mouse_in(area: Rect) -> tuple[Point | None, bool]:
 
 
 def _hover(state: ViewState, picture: Size, area: Rect, hovered: bool) -> None:
-    """The wheel zooms; the pixel under the mouse is noted."""
+    """The wheel zooms, a double click fits or goes to 1:1; the pixel under the mouse is noted."""
     io = imgui.get_io()
     mouse = (io.mouse_pos.x, io.mouse_pos.y)
+    if hovered and imgui.is_mouse_double_clicked(0):
+        fitted = state.zoom.scale is None
+        factor = 1 / fit_scale(picture, area)
+        state.zoom = zoom_about(state.zoom, factor, mouse, picture, area) if fitted else Zoom()
     if hovered and io.mouse_wheel:
         state.zoom = zoom_about(state.zoom, WHEEL_STEP**io.mouse_wheel, mouse, picture, area)
     state.cursor = _under(mouse, state, picture, area) if hovered else None

@@ -1,26 +1,25 @@
 #version 330 core
-// Which warped input the picture is most like, pixel by pixel: a share falls with the squared difference from the picture.
-#include "warp.glsl"
+// Which warped input the picture is most like: a share falls with the mean squared difference around the pixel.
 #include "lean.glsl"
 
-uniform sampler2D disparity;  // for the viewpoint on screen
-uniform sampler2D picture;    // as stored
+uniform sampler2D distances;
+uniform int reach;        // so many pixels to each side
+uniform float tolerance;  // differences much smaller than this count as none
 
 layout(location = 0) out vec4 colour;
 
-const float TOLERANCE = 0.02;  // differences much smaller than this count as none
-
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    float here = texelFetch(disparity, pixel, 0).r;
-    vec3 seen = texelFetch(picture, pixel, 0).rgb;
-    vec4 distances;
-    for (int k = 0; k < 4; ++k) {
-        vec2 source = warp_source(k, vec2(pixel), here);
-        vec3 difference = bicubic(corner_views, k, source) - seen;
-        distances[k] = inside_picture(source) ? dot(difference, difference) : 1e3;
+    ivec2 pixel = ivec2(gl_FragCoord.xy), last = textureSize(distances, 0) - 1;
+    ivec2 first = max(pixel - reach, ivec2(0)), end = min(pixel + reach, last);
+    vec4 sum = vec4(0.0);
+    for (int y = first.y; y <= end.y; ++y) {
+        for (int x = first.x; x <= end.x; ++x) {
+            sum += texelFetch(distances, ivec2(x, y), 0);
+        }
     }
-    float least = min(min(distances.x, distances.y), min(distances.z, distances.w));
-    vec4 share = exp((least - distances) / (2.0 * TOLERANCE * TOLERANCE));
+    ivec2 number = end - first + 1;
+    vec4 mean = sum / float(number.x * number.y);
+    float least = min(min(mean.x, mean.y), min(mean.z, mean.w));
+    vec4 share = exp((least - mean) / (2.0 * tolerance * tolerance));
     colour = vec4(lean_colour(share / dot(share, vec4(1.0))), 1.0);
 }

@@ -149,7 +149,7 @@ def test_a_drag_is_the_same_however_its_events_fall_into_frames(screen: Screen, 
 
 @pytest.mark.parametrize("look", [Look.DISPARITY, Look.ERROR, Look.WARPED_ALL, Look.WARPED_TOP_RIGHT])
 def test_clicks_in_the_panel_switch_the_look(screen: Screen, look: Look) -> None:
-    screen.find_in_panel(lambda: screen.state.look is look)
+    screen.find_in_panel(lambda: screen.state.look is look, "left" if look is Look.ERROR else "right")
 
 
 def test_ticking_the_boxes_changes_the_state(screen: Screen) -> None:

@@ -8,7 +8,7 @@ from app.canvas.passes import Pass, Passes
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import Textures
 from app.geometry import Point
-from app.looking import CORNER_COLOURS
+from app.looking import CORNER_COLOURS, LEAN_REACH, LEAN_TOLERANCE
 from app.tone import Tone
 from lfcore.lightfield import CORNERS
 
@@ -59,10 +59,15 @@ class Inside:
         if result.outdated("lean", viewpoint, share):
             disparity = self._synthesized.carry_disparity(viewpoint)
             picture = self._synthesized.picture(viewpoint, share, Tone())
+            textures.distances.target.use()
+            self._passes.get("lean_distances.frag").render(
+                {"corner_views": textures.corner_views, "disparity": disparity, "picture": picture.texture},
+                {"viewpoint": viewpoint},
+            )
             result.target.use()
             self._passes.get("lean_nearest.frag").render(
-                {"corner_views": textures.corner_views, "disparity": disparity, "picture": picture.texture},
-                {"viewpoint": viewpoint, "corner_colours": CORNER_COLOURS},
+                {"distances": textures.distances.texture},
+                {"corner_colours": CORNER_COLOURS, "reach": LEAN_REACH, "tolerance": LEAN_TOLERANCE},
             )
         return result.texture
 

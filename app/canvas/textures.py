@@ -64,6 +64,7 @@ class Textures:
         self.sheet = Picture(context, (2 * width, 2 * height), picture_type, self)
         self.precise = Picture(context, self.size, "f4", self)
         self.inner = Picture(context, self.size, picture_type, self)
+        self.distances = Picture(context, self.size, "f4", self)
         self.deviation = Picture(context, self.size, "f4", self, components=1)
         self.made = 0  # how often a target was made
         self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for

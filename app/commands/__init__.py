@@ -67,6 +67,7 @@ GESTURES: tuple[tuple[str, str, str], ...] = (
     (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
     (FOCUSING, "Shift + click", "Focus on what is under the cursor"),
     (ZOOMING, "Wheel", "Zoom about the cursor"),
+    (ZOOMING, "Double click", "Fit, or 1:1 about the cursor"),
     (ZOOMING, "Right drag, Space + drag", "Move the picture"),
     (EXPORTING, "Right click in the pad", "Add or remove a key frame"),
     (PROGRAM, "Drop", "Open a file or folder, or choose from several"),
