@@ -21,7 +21,7 @@ from app.desk import Card, Folder
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.exports import Exports, take_plan
-from app.focusing import FocusFacts, captured_serve, carried_disparity, focus_limits
+from app.focusing import FocusFacts, captured_serve, captured_sliced, carried_disparity, focus_limits
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
@@ -319,7 +319,9 @@ class Controller:
         return carried_disparity(newest.synthesis.disparity, _viewpoint_of(newest), self.viewpoint, point)
 
     def _focus_facts(self) -> FocusFacts:
-        return FocusFacts(focus_limits(self._span), self.captured_summed)
+        state = self.state
+        under = self._disparity_at(state.sliced) if state.focusing.slices and state.sliced is not None else None
+        return FocusFacts(focus_limits(self._span), self.captured_summed, under=under)
 
     def _hand_waits(self) -> bool:
         """Whether the person waits for a view, which comes before exports."""
@@ -345,6 +347,12 @@ class Controller:
         """Whether refocusing sums up captured views, not such as are drawn in between."""
         grid = self._grid
         return grid is None or captured_serve(self.state.focusing.views, grid.rows, grid.columns, self._span)
+
+    @property
+    def captured_sliced(self) -> bool:
+        """Whether slices are drawn from captured views, not from the newest synthesis."""
+        grid = self._grid
+        return grid is None or captured_sliced(self.state.focusing.views, grid.rows, grid.columns)
 
     @property
     def _resting(self) -> bool:
@@ -389,7 +397,7 @@ class Controller:
         self._asking.forget()
         self.comparing.forget()
         self._span = None
-        self.state.pick = None
+        self.state.pick = self.state.sliced = None
         self._shown = None
         self._heading = (0.0, 0.0)
         self._grid = None

@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from app.geometry import Point, Size
+from app.geometry import Point
 from lfcore.key_frames import MAX_FOCUS
 
 APERTURE_LIMITS = (0.0, 1.5)  # diameter in baselines; from 1.42 on it takes in all views, from the middle
@@ -20,6 +20,7 @@ _LEAST_APERTURE = 0.05  # by a key: below it the aperture is a pinhole
 _GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
 _ENOUGH_VIEWS = 5  # a side, as lfcore.sweep_frames has it
 _ITERATIONS = 4
+SLICE_RANGE = (-0.06, 1.06)  # of u, or v, that a slice shows
 
 
 class Choice(Enum):
@@ -130,12 +131,20 @@ def carried_disparity(
     return min(from_near, from_here) if abs(from_near - before) < 0.5 else from_here
 
 
-def slice_through(focusing: Focusing, cursor: Point | None, last: Point | None, picture: Size) -> Point:
-    """The picture point through which slices go: pinned, under the cursor, where the cursor was last, or the middle."""
-    for point in (focusing.pin, cursor, last):
-        if point is not None and 0 <= point[0] < picture[0] and 0 <= point[1] < picture[1]:
-            return point
-    return picture[0] / 2, picture[1] / 2
+def captured_sliced(choice: Choice, rows: int, columns: int) -> bool:
+    """Whether slices are drawn from the captured views, where others could be drawn in between."""
+    enough = choice is Choice.AUTOMATIC and min(rows, columns) > 2
+    return enough or choice is Choice.CAPTURED
+
+
+def place_in_slice(share: float) -> float:
+    """The u, or v, at a share of a slice's extent."""
+    return SLICE_RANGE[0] + share * (SLICE_RANGE[1] - SLICE_RANGE[0])
+
+
+def share_of_slice(place: float) -> float:
+    """The inverse of `place_in_slice`."""
+    return (place - SLICE_RANGE[0]) / (SLICE_RANGE[1] - SLICE_RANGE[0])
 
 
 def _between(value: float, limits: tuple[float, float]) -> float:

@@ -14,6 +14,7 @@ from imgui_bundle import ImVec4, imgui
 from app import panels, theme
 from app.canvas import Canvas, Colours, Frame, Target
 from app.canvas.atlas import Atlas
+from app.canvas.slices import Slicing
 from app.commands import Action, OpenPath, Request
 from app.comparing import Comparing
 from app.comparison import Source
@@ -23,9 +24,9 @@ from app.engine import Answer
 from app.exhibits import Exhibit
 from app.export_requests import CancelExport, ExportAction, ExportRequest
 from app.gallery import Seen
-from app.geometry import Placement, Rect, place, visible
-from app.layout import Layout
-from app.panes import arrange
+from app.geometry import Placement, Point, Rect, place, visible
+from app.layout import Layout, Strips
+from app.panes import Pane, arrange
 from app.settings import Theme
 from app.state import Look, Step
 from app.surroundings import Surroundings
@@ -264,6 +265,22 @@ class Interface:
             shown = self._partner_frame() if pane.partner else frame
             placement = pane.placement(state.zoom, self._canvas.picture_size(shown.look))
             self._canvas.draw(shown, target, _scaled(pane.clip, pixels), _magnified(placement, pixels))
+        if layout.strips is not None and state.sliced is not None:
+            self._draw_slices(layout.strips, state.sliced, target, arrange(state, layout.picture)[0], pixels)
+
+    def _draw_slices(self, strips: Strips, through: Point, target: Target, pane: Pane, pixels: float) -> None:
+        controller, state, canvas = self.controller, self.controller.state, self._canvas
+        captured = controller.captured_sliced or not canvas.has_disparity
+        placement = pane.placement(state.zoom, canvas.picture_size(state.look))
+        scaled = Strips(_scaled(strips.below, pixels), _scaled(strips.beside, pixels))
+        canvas.draw_slices(
+            Slicing(through, controller.viewpoint, captured),
+            state.looking.tone,
+            target,
+            scaled,
+            _scaled(pane.frame, pixels),
+            _magnified(placement, pixels),
+        )
 
     def _frame(self) -> Frame:
         """What the picture is to show; dimmed where the chosen look has nothing to show here."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app import keyboard, overlays, picture, sidebar, statusbar, theme
+from app import keyboard, overlays, picture, sidebar, statusbar, strips, theme
 from app.commands import Context, Request
 from app.geometry import Size
-from app.layout import Layout, lay_out
+from app.layout import Layout, lay_out, with_strips
 from app.panes import arrange
 from app.readout import Readout
 from app.sidebar import extras
@@ -28,6 +28,8 @@ def draw(
     the picture, and the requests.
     """
     layout = lay_out(*window, scale, state.panel and (readout.grid is not None or bool(readout.captions)))
+    if state.focusing.slices and readout.grid is not None and state.look.tiles == (1, 1):
+        layout = with_strips(layout, scale)
     size = picture_size(readout, state)
     area = layout.picture
     panes = arrange(state, area)
@@ -46,6 +48,9 @@ def draw(
         overlays.pixels(panes, state, readout, size, scale)
         overlays.names(panes, state, readout)
         overlays.cross_hairs(panes, state, size)
+        if layout.strips is not None:
+            state.sliced = state.focusing.pin or state.cursor or state.sliced or (size[0] / 2, size[1] / 2)
+            strips.draw(layout.strips, panes[0].frame, state, readout, panes[0].placement(state.zoom, size))
         overlays.wipe_handle(area, panes, state)
         overlays.notices(area, state, readout)
         overlays.legend(area, state, readout)

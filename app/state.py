@@ -181,6 +181,7 @@ class ViewState:
     comparison: Comparison = field(default_factory=Comparison)
     focusing: Focusing = field(default_factory=Focusing)
     pick: Point | None = None  # a picture point on which the person wants to focus
+    sliced: Point | None = None  # the picture point through which slices go
     tail: float = 1.0  # per cent of the disparity values left out at either end of the colour range
     model: str = ""  # for a hand at rest; empty: the one that the program was started with
     foresight: bool = True  # compute views that may be wanted next while nothing else is to be done

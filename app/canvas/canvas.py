@@ -21,12 +21,15 @@ from app.canvas.magnifier import Colours, Magnifier
 from app.canvas.passes import Passes
 from app.canvas.placing import shown_size
 from app.canvas.refocus import Refocused, Wanted
+from app.canvas.slices import Slices, Slicing
 from app.canvas.stereo import Stereo
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
 from app.comparison import Source
 from app.geometry import Placement, Point, Rect, Size
+from app.layout import Strips
 from app.state import Look
+from app.tone import Tone
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray
 
@@ -42,17 +45,20 @@ class _Makers:
     inside: Inside
     compared: Compared
     refocused: Refocused
+    slices: Slices
     stereo: Stereo
 
     @staticmethod
     def of(context: moderngl.Context, passes: Passes, textures: Textures) -> _Makers:
         synthesized = Synthesized(passes, textures)
+        refocused = Refocused(context, passes, textures)
         return _Makers(
             textures,
             synthesized,
             Inside(passes, textures, synthesized),
             Compared(passes, textures, synthesized),
-            Refocused(context, passes, textures),
+            refocused,
+            Slices(passes, textures, refocused),
             Stereo(context, passes, textures),
         )
 
@@ -232,6 +238,13 @@ class Canvas:
             self._magnifier.map(texture, colours, target, area, placement)
         else:
             self._magnifier.image(texture, frame.dim, target, area, placement)
+
+    def draw_slices(
+        self, slicing: Slicing, tone: Tone, target: Target, strips: Strips, area: Rect, placement: Placement
+    ) -> None:
+        """Draw epipolar slices into the strips beside the picture that lies in the area at the placement."""
+        more = self._at_hand.slices.draw(slicing, tone, target, strips, area, placement)
+        self.unfinished = self.unfinished or more
 
     def draw_exhibit(self, target: Target, area: Rect, placement: Placement, colours: Colours | None) -> None:
         """Draw the exhibit into the target as `draw` does; a map in these colours."""

@@ -41,6 +41,8 @@ class Gathered(ABC):
         self.version = 0  # grows with every change
         width, height = size[0] * len(columns_at), size[1] * len(rows_at)
         self.texture = context.texture((width, height), 4, alignment=1)
+        self.target = context.framebuffer([self.texture])
+        self.target.clear()
         self.order = spread_order(self.positions)
 
     def tile(self, index: int) -> tuple[int, int]:
@@ -68,6 +70,7 @@ class Gathered(ABC):
 
     def release(self) -> None:
         """Give the memory of the graphics back."""
+        self.target.release()
         self.texture.release()
 
 
@@ -126,7 +129,6 @@ class Synthesized(Gathered):
         super().__init__(context, textures.size, places, places)
         self._passes = passes
         self._textures = textures
-        self._target = context.framebuffer([self.texture])
         self._distance = np.full(len(self.positions), np.inf)  # from the synthesis that each was drawn from
 
     def words(self, count: int) -> str:
@@ -147,15 +149,10 @@ class Synthesized(Gathered):
         width, height = self.size
         for index in self._gains()[: max(_DRAWN_PER_FRAME // (width * height), 1)]:
             at = (float(self.positions[index][0]), float(self.positions[index][1]))
-            draw_elsewhere(self._passes, textures, self._target, self.tile(int(index)), at, Tone())
+            draw_elsewhere(self._passes, textures, self.target, self.tile(int(index)), at, Tone())
             self._distance[index] = math.dist(at, made_at)
             self.filled[index] = True
             self.version += 1
-
-    def release(self) -> None:
-        """Give the memory of the graphics back."""
-        self._target.release()
-        super().release()
 
     def _gains(self) -> npt.NDArray[np.intp]:
         """The views that are worth being drawn now, in order."""

@@ -77,7 +77,7 @@ def _stereo(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     baseline = slider("Baseline", focusing.baseline, BASELINE_LIMITS, number(focusing.baseline, 2), hint)
     hint = "The disparity that both eyes see at the same place, on the screen's own plane; px over the baseline.  ([ and ])"
     convergence = slider(
-        "Converge", focusing.convergence, readout.focus.limits, f"{number(focusing.convergence, 2)} px", hint
+        "Screen", focusing.convergence, readout.focus.limits, f"{number(focusing.convergence, 2)} px", hint
     )
     if (baseline, convergence) != (focusing.baseline, focusing.convergence):
         state.focusing = replace(state.focusing, baseline=baseline, convergence=convergence)
