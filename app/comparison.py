@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 # Partners that are no model; the texts are their names on screen.
@@ -53,10 +53,8 @@ class Comparison:
 
     partner: str = CAPTURED_VIEW
     arrangement: Arrangement = Arrangement.ALONE
-    flipped: bool = False  # the partner is shown in place of the picture
     wipe: float = 0.5  # where the handle lies, as a fraction of the width of the picture's area
     difference: Difference = Difference.ABSOLUTE
-    all_views: bool = False  # every captured view is to be scored, not only those that come to memory anyway
 
     @property
     def source(self) -> Source:
@@ -67,6 +65,10 @@ class Comparison:
     def model(self) -> str | None:
         """The model that makes the partner, or None."""
         return self.partner if self.source is Source.MODEL else None
+
+    def bounded(self) -> Comparison:
+        """The same with the handle within the picture's area."""
+        return replace(self, wipe=min(max(self.wipe, 0.0), 1.0))
 
 
 def partners(models: Sequence[str], model: str) -> tuple[str, ...]:

@@ -364,7 +364,7 @@ class Controller:
 
     @property
     def _has_idle_work(self) -> bool:
-        return self.state.foresight or self.state.comparison.all_views or self._wants_table
+        return self.state.foresight or self.state.score_all or self._wants_table
 
     @property
     def _wants_table(self) -> bool:
@@ -558,7 +558,7 @@ class Controller:
         if missing is not None:
             return Wish(Task.COMPARE, self.viewpoint, missing)
         unscored = self._scoreboard.missing_view(self._grid, self.viewpoint)
-        if self.state.comparison.all_views and unscored is not None:
+        if self.state.score_all and unscored is not None:
             return Wish(Task.SCORE, unscored)
         if self.state.foresight and engine.has_room(light_field):
             for point in viewpoints_ahead(self.viewpoint, self._heading, self._grid):

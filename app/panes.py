@@ -29,7 +29,7 @@ def arrange(state: ViewState, area: Rect) -> tuple[Pane, ...]:
     comparison = state.comparison
     if state.look.tiles != (1, 1):
         return (Pane(area, area, False),)
-    if comparison.flipped:
+    if state.flipped:
         return (Pane(area, area, True),)
     if comparison.arrangement is Arrangement.SIDE_BY_SIDE:
         width = (area.width - GAP) / 2

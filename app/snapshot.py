@@ -12,7 +12,7 @@ from app.state import GAIN_LIMITS, TAIL_LIMITS, ViewState
 Snapshot = Mapping[str, Json]
 
 # Fields of ViewState that a snapshot holds.
-LOOKED_AT = ("u", "v", "look", "captured", "looking", "focusing", "zoom", "gain", "tail")
+LOOKED_AT = ("u", "v", "look", "captured", "looking", "focusing", "comparison", "zoom", "gain", "tail")
 
 
 def take(state: ViewState) -> Snapshot:
@@ -43,6 +43,7 @@ def _hold_within_limits(state: ViewState) -> None:
     state.tail = _between(state.tail, TAIL_LIMITS)
     state.looking = state.looking.bounded()
     state.focusing = state.focusing.bounded()
+    state.comparison = state.comparison.bounded()
 
 
 def _between(value: float, limits: tuple[float, float]) -> float:

@@ -179,6 +179,8 @@ class ViewState:
     zoom: Zoom = field(default_factory=Zoom)
     gain: float = 8.0  # of the error look
     comparison: Comparison = field(default_factory=Comparison)
+    flipped: bool = False  # the partner is shown in place of the picture
+    score_all: bool = False  # every captured view is to be scored, not only those that come to memory anyway
     focusing: Focusing = field(default_factory=Focusing)
     pick: Point | None = None  # a picture point on which the person wants to focus
     sliced: Point | None = None  # the picture point through which slices go

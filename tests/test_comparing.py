@@ -227,7 +227,7 @@ def test_all_captured_views_are_scored_on_demand_without_driving_anything_out_of
         program.open()
         program.idle()
         assert sum(score is not None for score in scores(program)) == 1
-        program.compare(all_views=True)
+        program.state.score_all = True
         program.until(lambda: None not in scores(program))
         expected = [
             k16(truth(u, v) + program.models["first"].excess, light_field().view(*divmod(index, 3))).psnr
@@ -275,7 +275,7 @@ def test_views_from_disk_are_scored_without_being_synthesized_again(tmp_path: Pa
 def test_scoring_stops_at_once_when_the_person_does_something(program: Program) -> None:
     first = program.models["first"]
     first.seconds = 60.0
-    program.compare(all_views=True)
+    program.state.score_all = True
     program.until(lambda: len(first.asked) == 2)
     assert "scoring" in program.controller.readout(None).busy
     program.controller.touch()

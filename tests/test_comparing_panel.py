@@ -43,11 +43,11 @@ def chord(screen: Screen, modifier: str, name: str) -> None:
 
 def test_the_partner_is_seen_as_long_as_the_key_is_held(screen: Screen) -> None:
     hold(screen, "R", True)
-    assert screen.state.comparison.flipped
+    assert screen.state.flipped
     screen.frame(5)
-    assert screen.state.comparison.flipped
+    assert screen.state.flipped
     hold(screen, "R", False)
-    assert not screen.state.comparison.flipped
+    assert not screen.state.flipped
 
 
 def test_wipe_and_side_by_side_take_turns(screen: Screen) -> None:
@@ -156,9 +156,9 @@ def test_the_key_of_differences_first_shows_one_and_then_goes_through_the_kinds(
 def test_the_key_of_scores_opens_the_tab(screen: Screen) -> None:
     screen.state.panel = False
     screen.press("H")
-    assert screen.state.comparison.all_views and screen.state.tab is Tab.COMPARE and screen.state.panel
+    assert screen.state.score_all and screen.state.tab is Tab.COMPARE and screen.state.panel
     screen.press("H")
-    assert not screen.state.comparison.all_views
+    assert not screen.state.score_all
 
 
 def test_a_click_in_the_map_of_scores_goes_to_the_view(screen: Screen) -> None:

@@ -49,7 +49,9 @@ def test_a_wipe_divides_one_picture_at_its_handle() -> None:
 
 def test_flipped_there_is_only_the_partner() -> None:
     for arrangement in Arrangement:
-        (pane,) = arrange(state(arrangement=arrangement, flipped=True), AREA)
+        made = state(arrangement=arrangement)
+        made.flipped = True
+        (pane,) = arrange(made, AREA)
         assert pane.partner and pane.frame == pane.clip == AREA
 
 

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.commands.kinds import COMPARING, Command, Context, Run
+from app.commands.kinds import COMPARING, Command, Context, Run, toggle
 from app.comparison import WIPE_STEP, Arrangement, Difference, partners
 from app.state import Look, Tab
 
 
-def _flip(context: Context) -> None:
-    comparison = context.state.comparison
-    context.state.comparison = replace(comparison, flipped=not comparison.flipped)
-
-
 def _flip_back(context: Context) -> None:
-    context.state.comparison = replace(context.state.comparison, flipped=False)
+    context.state.flipped = False
 
 
 def _arrange(arrangement: Arrangement) -> Run:
@@ -59,13 +54,15 @@ def _next_difference(context: Context) -> None:
 
 def _score_all(context: Context) -> None:
     state = context.state
-    state.comparison = replace(state.comparison, all_views=not state.comparison.all_views)
-    if state.comparison.all_views:
+    state.score_all = not state.score_all
+    if state.score_all:
         state.tab, state.panel = Tab.COMPARE, True
 
 
 COMMANDS: dict[str, Command] = {
-    "flip": Command(("R",), "Hold to see the partner in place of the picture", COMPARING, _flip, released=_flip_back),
+    "flip": Command(
+        ("R",), "Hold to see the partner in place of the picture", COMPARING, toggle("flipped"), released=_flip_back
+    ),
     "wipe": Command(("W",), "Wipe between the picture and its partner", COMPARING, _arrange(Arrangement.WIPE)),
     "wipe left": Command(("Shift+Left",), "Move the wipe's handle to the left", COMPARING, _wipe(-WIPE_STEP)),
     "wipe right": Command(("Shift+Right",), "Move the wipe's handle to the right", COMPARING, _wipe(WIPE_STEP)),

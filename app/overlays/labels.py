@@ -18,7 +18,7 @@ from lfcore.lightfield import is_extrapolated
 def notices(area: Rect, state: ViewState, readout: Readout) -> None:
     """Short labels at the top of the picture: what is looked at, and whether it is extrapolated."""
     labels: list[tuple[str, ImVec4]] = []
-    if state.comparison.flipped:
+    if state.flipped:
         labels.append((comparison.partner_name(state, readout).capitalize(), theme.GOOD))
     elif state.comparison.arrangement is not Arrangement.ALONE:
         pass  # each picture has its own name

@@ -44,7 +44,7 @@ def _arrangement(context: Context) -> None:
     gap = em() * 0.25
     third = (imgui.get_content_region_avail().x - 2 * gap) / 3
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(gap, imgui.get_style().item_spacing.y))
-    tile("Flip", "flip", comparison.flipped, context, third)
+    tile("Flip", "flip", context.state.flipped, context, third)
     imgui.same_line()
     tile("Wipe", "wipe", comparison.arrangement is Arrangement.WIPE, context, third)
     imgui.same_line()

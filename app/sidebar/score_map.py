@@ -56,7 +56,7 @@ def draw(context: Context, readout: Readout, grid: Grid) -> None:
     rows = [("mean", total.mean), ("least", total.least), ("greatest", total.greatest)]
     pairs("views", [(name, DASH if value is None else decibels(value)) for name, value in rows])
     _bar()
-    tile("Score all", "score all", context.state.comparison.all_views, context, imgui.get_content_region_avail().x)
+    tile("Score all", "score all", context.state.score_all, context, imgui.get_content_region_avail().x)
     imgui.end_group()
 
 
