@@ -30,6 +30,7 @@ from app.samples import Samples
 from app.sampling import Sampler
 from app.scoreboard import Scoreboard
 from app.state import CARRIED_NEAR, Grid, Look, Step, Tab, ViewState, carried_share
+from app.sway import Sway
 from lfcore.cache import rounded
 from lfcore.errors import LfviewError
 from lfcore.lightfield import LightField
@@ -76,6 +77,7 @@ class Controller:
         for name, choice in self._models.items():
             engine.know(name, choice.make)
         self._sampler = Sampler()
+        self._sway = Sway()
         self.comparing = Comparing(engine, wake)
         self._scoreboard = Scoreboard(engine, self._models)
         self.exports = Exports(self._models, wake, self._hand_waits)
@@ -158,6 +160,7 @@ class Controller:
         if self.light_field is None:
             return
         self._play(now)
+        self._sway.move(self.state, now)
         self._pick()
         if self._shown != self.viewpoint:
             self._follow(self.light_field)
@@ -203,6 +206,8 @@ class Controller:
             return 0.0
         if self.light_field is None:
             return None
+        if self.state.swaying:
+            return 0.0
         if self.state.export.playing:
             return self.state.export.next_stop_in(self._now) or 0.0
         if not self._resting:

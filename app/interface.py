@@ -90,7 +90,7 @@ class Interface:
         for request in requests:
             self._fulfil(request)
         self.controller.tick(now)
-        self.surroundings.tick(now, imgui.is_any_mouse_down())
+        self.surroundings.tick(now, imgui.is_any_mouse_down() or state.swaying)
         self._synchronise()
         self._synchronise_exhibit()
         pixels = target.size[0] / max(display.x, 1.0)

@@ -194,6 +194,7 @@ class ViewState:
     path_text: str = ""
     cursor: Point | None = None  # in picture pixels, None outside
     inspector: bool = False
+    swaying: bool = False  # the viewpoint moves by itself on a small circle
     desk: Desk = field(default_factory=Desk)  # what lies around the picture
     exhibit: int = 0  # which picture or map of a Lytro file without raw is shown
     export: ExportChoices = field(default_factory=ExportChoices)

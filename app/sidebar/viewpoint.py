@@ -8,7 +8,7 @@ from app import theme
 from app.commands import Context
 from app.readout import Readout
 from app.sidebar import viewpoint_pad
-from app.widgets import button, heading, number, text
+from app.widgets import button, heading, number, text, tile
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -29,10 +29,14 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     imgui.dummy(ImVec2(0, max(pad - used - buttons - spacing.y, 0)))
     half = (rest - spacing.x / 2) / 2
     button("Nearest", "nearest", context, rest)
-    button("<", "previous", context, half)
+    quarter = (rest - 3 * spacing.x / 2) / 4
+    for index, (label, command) in enumerate((("|<", "first"), ("<", "previous"), (">", "next"), (">|", "last"))):
+        if index:
+            imgui.same_line(0, spacing.x / 2)
+        button(label, command, context, quarter)
+    button("Centre", "centre", context, half)
     imgui.same_line(0, spacing.x / 2)
-    button(">", "next", context, half)
-    button("Centre", "centre", context, rest)
+    tile("Sway", "sway", context.state.swaying, context, half)
     imgui.end_group()
 
 
