@@ -18,6 +18,7 @@ import glfw  # isort: skip
 from app import frametimes
 from app.canvas import Target, windowed_context
 from app.controller import Controller
+from app.display_loss import on_display_loss
 from app.engine import Engine, ModelChoice
 from app.frametimes import FrameTimes
 from app.geometry import Rect
@@ -121,15 +122,21 @@ def _window(
         engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview, models=models
     )
     surroundings = Surroundings(controller, glfw.post_empty_event, keeping)
+
+    def stop() -> None:
+        surroundings.stop()
+        controller.stop()
+
+    handler = on_display_loss(stop)
     try:
         window.attach(controller, surroundings)
         yield window, controller
     finally:
         surroundings.window = window.place()
         window.hide()
-        surroundings.stop()
-        controller.stop()
+        stop()
         window.close()
+        del handler
 
 
 class _Loader:
