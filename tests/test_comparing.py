@@ -22,7 +22,7 @@ from lfcore.metrics import k16, similarity_map, to_uint8
 from lfcore.store import ViewStore
 from lfcore.synthesizer import Synthesis
 
-PATIENCE = 10.0
+PATIENCE = 60.0
 
 
 class Shifted(TruthSynthesizer):
