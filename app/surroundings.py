@@ -23,6 +23,7 @@ from app.opening import SHIPPED, folder_around, list_folder
 from app.settings import Settings, SettingsFile, Theme, WindowPlace
 from app.snapshot import Snapshot, put_back, take
 from app.state import ViewState
+from app.watching import Watching
 from app.worker import Cancel, Done, Failed, LatestWorker
 from assets import sample_path
 from lfcore.errors import InputError, OutputError
@@ -69,6 +70,7 @@ class Surroundings:
         self._file = keeping.file
         self._gallery = Gallery(keeping.thumbnails, wake)
         self._history = History()
+        self._watching = Watching(wake)
         self._dialog: dialogs.Dialog | None = None
         self._wake = wake
         self._lister: LatestWorker[Folder] = LatestWorker("folders", wake)
@@ -90,6 +92,7 @@ class Surroundings:
         """End the threads, and write the settings."""
         if self._dialog is not None:
             self._dialog.close()
+        self._watching.stop(STOP_SECONDS)
         self._gallery.stop(STOP_SECONDS)
         self._lister.stop(STOP_SECONDS)
         self._saver.stop(STOP_SECONDS)
@@ -115,6 +118,9 @@ class Surroundings:
         self._follow_dialog()
         self._follow_folders()
         self._follow_saver()
+        change = self._watching.news()
+        if change is not None:
+            self.controller.say(change)
         self.arrive()
         controller = self.controller
         if isinstance(self._open, LightField) and controller.light_field is self._open:
@@ -129,7 +135,9 @@ class Surroundings:
         if opened is self._open or controller.previewing:
             return
         self.settings = self._with_open_file()
+        before, left = self._open, self._left
         self._open, self._left = opened, None
+        self._watching.follow(Path(opened.source).absolute() if opened is not None else None)
         if opened is None:
             return
         if controller.state.desk.card is Card.BROWSER:
@@ -137,7 +145,8 @@ class Surroundings:
         if not _is_sample(opened.source):
             self.settings = self.settings.with_recent(str(Path(opened.source).absolute()))
         if isinstance(opened, LightField):
-            put_back(controller.state, self.settings.files.get(opened.content_key, {}))
+            again = before is not None and before.source == opened.source  # with other contents, perhaps
+            put_back(controller.state, self.settings.files.get(opened.content_key) or (left if again and left else {}))
             self._history.start(take(controller.state))
 
     @property
@@ -170,6 +179,10 @@ class Surroundings:
             self._put(self._history.undo())
         elif request is Action.REDO:
             self._put(self._history.redo())
+        elif request is Action.REOPEN:
+            opened = self.controller.light_field or self.controller.exhibition
+            if opened is not None:
+                self.controller.open(Path(opened.source))
         elif request is Action.FORGET:
             self.settings = replace(self.settings, recent=(), files={})
             self._left = None

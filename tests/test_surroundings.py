@@ -24,6 +24,7 @@ from app.opening import open_by_content
 from app.settings import Settings, SettingsFile, Theme, WindowPlace
 from app.state import Look
 from app.surroundings import SAVE_SECONDS, Keeping, Surroundings
+from app.watching import Watching
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
 
@@ -197,6 +198,27 @@ def test_undo_and_redo_and_nothing_of_another_file(program: Program) -> None:
     program.open("/a/2x2")
     program.around.fulfil(Action.UNDO)
     assert (state.u, state.v) == (0.5, 0.5)
+
+
+def test_a_file_that_has_changed_is_said_and_opened_again_as_it_was_looked_at(
+    made: list[Program], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.surroundings.Watching", lambda wake: Watching(wake, 0.02))
+    program = Program()
+    made.append(program)
+    (tmp_path / "3x3").write_text("a stand-in")
+    program.open(str(tmp_path / "3x3"))
+    time.sleep(0.3)  # the first look
+    program.tick()
+    (tmp_path / "3x3").write_text("another")
+    program.until(lambda: bool(program.controller.messages))
+    assert "has changed on disk" in program.controller.messages[0]
+    program.controller.state.move_to(0.25, 0.5)
+    program.tick()
+    before = program.controller.light_field
+    program.around.fulfil(Action.REOPEN)
+    program.until(lambda: program.controller.light_field is not before)
+    assert program.controller.state.u == 0.25
 
 
 def test_recent_files_and_looks_can_be_forgotten(file: SettingsFile) -> None:

@@ -54,6 +54,7 @@ COMMANDS: dict[str, Command] = {
     "open": Command(("Ctrl+O",), "Open a file", PROGRAM, request(Ask(Purpose.OPEN_FILE)), _ANYTIME),
     "open folder": Command(("Ctrl+Shift+B",), "Open a folder", PROGRAM, request(Ask(Purpose.OPEN_FOLDER)), _ANYTIME),
     "path": Command(("Ctrl+Shift+O",), "Open a file or folder by its path", PROGRAM, _show_path_field, _ANYTIME),
+    "reopen": Command(("Ctrl+R",), "Open it again, as it is now on disk", PROGRAM, request(Action.REOPEN), Needs.PICTURE),
     "browse": Command(("Ctrl+B",), "Show the light fields of the folder, with pictures", PROGRAM, _browse, _ANYTIME),
     "undo": Command(("Ctrl+Z",), "Undo the last change of the view", PROGRAM, request(Action.UNDO), Needs.PICTURE),
     "redo": Command(("Ctrl+Y", "Ctrl+Shift+Z"), "Redo what was undone", PROGRAM, request(Action.REDO), Needs.PICTURE),

@@ -36,6 +36,7 @@ class Action(Enum):
     UNDO = "undo"
     REDO = "redo"
     FORGET = "forget"
+    REOPEN = "reopen"
     QUIT = "quit"
 
 
