@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -36,6 +37,9 @@ from lfcore.lightfield import CORNERS, FloatArray, LightField
 
 GLSL_VERSION = "#version 330 core"
 DIMMED = 0.35
+FAULTS_TO_CLOSE, FAULTS_TO_END = 3, 30  # frames in a row that fail
+
+_log = logging.getLogger(__name__)
 
 
 class Interface:
@@ -63,6 +67,8 @@ class Interface:
         self._timed = False  # a picture was made in the last frame
         self._saving = False  # the picture of this frame is to be saved
         self._picture_ms: float | None = None
+        self._faults = 0  # frames in a row that have failed
+        _let_imgui_recover()
         imgui.backends.opengl3_init(GLSL_VERSION)
 
     def set_scale(self, scale: float) -> None:
@@ -73,7 +79,28 @@ class Interface:
             theme.change_scale(scale)
 
     def draw(self, target: Target, now: float) -> None:
-        """Draw one frame. imgui's display size and events must have been set (by its platform backend); `now` in seconds."""
+        """Draw one frame. imgui's display size and events must have been set (by its platform backend); `now` in seconds.
+
+        A fault becomes a message, and the next frame is drawn as if it had not been; where frames go on failing, what is
+        open is closed, and at last the fault is raised.
+        """
+        try:
+            self._draw(target, now)
+            self._faults = 0
+        except Exception as error:  # a fault in one part of the window must not take everything else with it
+            self._survive(error)
+
+    def _survive(self, error: Exception) -> None:
+        imgui.end_frame()  # where it was begun; imgui then closes the windows that were left open
+        self._faults += 1
+        if self._faults >= FAULTS_TO_END:
+            raise error
+        _log.error("a frame failed", exc_info=error)
+        if self._faults >= FAULTS_TO_CLOSE:
+            self.controller.close()
+        self.controller.say(_sentence(error))
+
+    def _draw(self, target: Target, now: float) -> None:
         self.controller.tick(now)
         self.surroundings.arrive()
         self._change_theme()
@@ -198,9 +225,11 @@ class Interface:
                 try:
                     canvas.set_light_field(corners)
                     canvas.set_views(light_field.views, light_field.dark)
-                except LfviewError as error:
+                    canvas.check_memory()
+                except (LfviewError, moderngl.Error) as error:
+                    canvas.clear()
                     controller.close()
-                    controller.say(str(error))
+                    controller.say(_sentence(error))
                     return
             self._light_field = light_field
         if light_field is None:
@@ -330,6 +359,25 @@ class Interface:
     def _instant_frame(self) -> Frame:
         """The instant picture in the values that are stored."""
         return Frame(Look.SYNTHESIS, self.controller.viewpoint, source=Source.INSTANT)
+
+
+def _let_imgui_recover() -> None:
+    """Where a frame is broken off, imgui is to tidy up and not to complain; one of its three ways of telling must be on."""
+    io = imgui.get_io()
+    io.config_error_recovery_enable_assert = False
+    io.config_error_recovery_enable_tooltip = False
+    io.config_error_recovery_enable_debug_log = True
+
+
+def _sentence(error: Exception) -> str:
+    """What is said of a fault."""
+    if isinstance(error, LfviewError):
+        return str(error)
+    if isinstance(error, moderngl.Error):
+        return f"The graphics cannot draw this: {error}; open a smaller light field, or update the graphics driver."
+    if isinstance(error, MemoryError):
+        return "There is not enough memory for this; close other programs or open a smaller light field."
+    return f"Unexpected fault in the program: {type(error).__name__}: {error}"
 
 
 def _rgb(colour: ImVec4) -> tuple[float, float, float]:

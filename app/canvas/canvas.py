@@ -118,6 +118,11 @@ class Canvas:
             self.draw(Frame(Look.SYNTHESIS, here), target, Rect(0, 0, *size), Placement(scale, (0.0, 0.0)))
         self.clear()
 
+    def check_memory(self) -> None:
+        """Raise InputError where the graphics had no room for what they were last given."""
+        if self.context.error == "GL_OUT_OF_MEMORY":
+            raise InputError("The graphics have not enough memory for this light field; open one with smaller or fewer views.")
+
     def clear(self) -> None:
         """Forget the light field and everything that belongs to it."""
         self._resting_place.use()
