@@ -23,7 +23,8 @@ from lfcore.refocus import aperture_weights
 
 _COARSE = 12  # views, as in refocus_coarse.frag
 _MOST = 16  # views of a chunk, as in refocus_row.frag
-_READS_PER_FRAME = 5_000_000  # of pixels, about a millisecond for each million where two cores of a processor draw
+_NEW_VIEWS = 8  # while views are still coming, the coarse picture is drawn again after so many
+_READS_PER_FRAME = 4_000_000  # of pixels, about a millisecond for each million where two cores of a processor draw
 _TAPS = 4
 
 _Value = TypeVar("_Value")
@@ -79,8 +80,8 @@ class Refocused:
         """Do the part of one frame; whether more is to be done in the next."""
         gathered = self.gathered(wanted.captured)
         gathered.fill()
-        self._begin(wanted, gathered)
-        if gathered.complete and self._waiting:
+        # The first frame has its coarse picture to draw; while the focus or the viewpoint moves, every frame is a first one.
+        if not self._begin(wanted, gathered) and self._waiting:
             self._sum_up(gathered)
         return not gathered.complete or bool(self._waiting)
 
@@ -92,7 +93,8 @@ class Refocused:
         self._begin(wanted, gathered)
         sums = self._at_hand
         done = gathered.complete and not self._waiting
-        if sums.picture.outdated("refocused", wanted, gathered, gathered.version, done, tone):
+        stage = gathered.version if gathered.complete else gathered.version // _NEW_VIEWS
+        if sums.picture.outdated("refocused", wanted, gathered, stage, done, tone):
             sums.picture.target.use()
             if done:
                 self._passes.toned("refocused.frag", tone).render({"sum": sums.sum}, {})
@@ -123,15 +125,16 @@ class Refocused:
             self._sums = _Sums(self._context, self._textures)
         return self._sums
 
-    def _begin(self, wanted: Wanted, gathered: Gathered) -> None:
-        """Start anew where something else is wanted than what is being summed up."""
+    def _begin(self, wanted: Wanted, gathered: Gathered) -> bool:
+        """Start anew where something else is wanted than what is being summed up; whether it is."""
         summing = (wanted, gathered, gathered.version)
         if summing == self._summing:
-            return
+            return False
         self._summing = summing
         self._waiting = _chunks(wanted, gathered, self._chunk_size) if gathered.complete else []
         self.words = gathered.words(int(np.count_nonzero(_weights(wanted, gathered))))
         self._at_hand.sum_target.clear()
+        return True
 
     @property
     def _chunk_size(self) -> int:
