@@ -29,7 +29,7 @@ from app.readout import Compared, Readout
 from app.samples import Samples
 from app.sampling import Sampler
 from app.scoreboard import Scoreboard
-from app.state import CARRIED_NEAR, Grid, Look, Step, Tab, ViewState, carried_share
+from app.state import CARRIED, Grid, Look, Step, Tab, ViewState, carried_share
 from app.sway import Sway
 from lfcore.cache import rounded
 from lfcore.errors import LfviewError
@@ -146,6 +146,10 @@ class Controller:
         self.exports.stop(STOP_SECONDS)
         self.comparing.stop()
 
+    def share_processor(self) -> None:
+        """The graphics draw on the processor: from now on a core is left to them while the hand moves."""
+        self._engine.share_processor()
+
     # Once a frame.
 
     def tick(self, now: float) -> None:
@@ -227,6 +231,12 @@ class Controller:
             return Step.BLEND
         carried = carried_share(math.dist(_viewpoint_of(self.newest), self.viewpoint))
         return Step.REALTIME if self.newest.step is Step.REALTIME and carried >= 0.5 else Step.INSTANT
+
+    @property
+    def synthesizing(self) -> bool:
+        """Whether the networks work for the viewpoint on screen."""
+        wish = self._asking.wish
+        return wish is not None and wish.task in FOR_NOW and self._asking.busy
 
     @property
     def captured_here(self) -> int | None:
@@ -483,7 +493,7 @@ class Controller:
         newest = self.newest
         if newest is None or not newest.step is answer.step is Step.REALTIME:
             return False
-        return math.dist(_viewpoint_of(newest), _viewpoint_of(answer)) <= CARRIED_NEAR
+        return math.dist(_viewpoint_of(newest), _viewpoint_of(answer)) <= CARRIED.near
 
     def _follow(self, light_field: LightField) -> None:
         """The viewpoint has moved."""

@@ -12,7 +12,7 @@ from app.controller import Controller
 from lfcore.errors import LfviewError
 
 _PATIENCE_SECONDS = 120.0
-_FRAME_SECONDS = 1 / 60
+FRAME_SECONDS = 1 / 60
 _TURN_SECONDS = 4.0  # for once round the circle of viewpoints
 _RADIUS = 0.35
 _WARM_UP = (0.0, 0.05, 0.15, 0.3)  # distances from the centre, so that every shader has been compiled
@@ -30,11 +30,13 @@ class FrameTimes:
     where: str
 
 
-def measure(controller: Controller, draw: Callable[[], None], seconds: float, where: str) -> FrameTimes:
-    """Drag the viewpoint round a circle for `seconds`, 60 times a second, and time `draw`.
+def measure(
+    controller: Controller, draw: Callable[[], None], interval: Callable[[], float], seconds: float, where: str
+) -> FrameTimes:
+    """Drag the viewpoint round a circle for `seconds` and time `draw`, which is called every `interval()` seconds.
 
-    The synthesis thread is busy throughout, since every frame asks for another viewpoint. What counts is the loop's own
-    work: events, panels, picture and swap, until the graphics are done; not the waiting for the next sixtieth of a second.
+    The networks are busy throughout, since every frame asks for another viewpoint. What counts is the loop's own
+    work: events, panels, picture and swap, until the graphics are done; not the waiting for the next frame's time.
     Measuring begins when the first disparity map is at hand, so that the instant step is measured. Raises LfviewError
     where the light field or the model does not come.
     """
@@ -53,7 +55,7 @@ def measure(controller: Controller, draw: Callable[[], None], seconds: float, wh
         views += controller.newest is not newest
         newest = controller.newest
         times.append(1e3 * spent)
-        time.sleep(max(_FRAME_SECONDS - spent, 0.0))
+        time.sleep(max(interval() - spent, 0.0))
     ordered = sorted(times)
     p95 = ordered[int(0.95 * (len(ordered) - 1))]
     return FrameTimes(statistics.median(ordered), p95, len(ordered), views / seconds, where)

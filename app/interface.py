@@ -13,7 +13,7 @@ import numpy as np
 from imgui_bundle import ImVec4, imgui
 
 from app import panels, theme
-from app.canvas import Canvas, Colours, Frame, Target
+from app.canvas import Canvas, Colours, Frame, Target, draws_in_software
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
 from app.commands import Action, OpenPath, Request
@@ -29,7 +29,7 @@ from app.geometry import Placement, Point, Rect, place, visible
 from app.layout import Layout, Strips
 from app.panes import Pane, arrange
 from app.settings import Theme
-from app.state import Look, Step
+from app.state import CARRIED, CARRIED_IN_SOFTWARE, Look, Step
 from app.surroundings import Surroundings
 from assets import sample_path
 from lfcore.errors import LfviewError
@@ -52,7 +52,10 @@ class Interface:
         self.surroundings = surroundings or Surroundings(controller, wake=lambda: None)
         self.surroundings.picture_of = self._picture_of
         self.closing = False
-        self._canvas = Canvas(context)
+        self.in_software = draws_in_software(context)
+        if self.in_software:
+            controller.share_processor()
+        self._canvas = Canvas(context, reach=CARRIED_IN_SOFTWARE if self.in_software else CARRIED)
         self._atlas = Atlas(context)
         self._fonts = theme.apply(scale)
         self._theme = Theme.DARK

@@ -96,7 +96,7 @@ def measure_frames_offscreen(path: Path, seconds: float, model: str = "full") ->
         viewer = Offscreen(controller, context, (1280, 800), 1.0)
         try:
             controller.open(path)
-            return frametimes.measure(controller, viewer.draw, seconds, "off screen")
+            return frametimes.measure(controller, viewer.draw, lambda: frametimes.FRAME_SECONDS, seconds, "off screen")
         finally:
             viewer.close()
 

@@ -117,14 +117,25 @@ STEP_MEANING = {
     Step.CAPTURED: "the camera's own view",
 }
 
-# A synthesis is carried by its disparity to viewpoints this near (of the baseline) as it is, and up to the second distance
-# ever more mixed with the warped corner views, which know what it has not seen.
-CARRIED_NEAR, CARRIED_FAR = 0.1, 0.2
+
+@dataclass(frozen=True)
+class Reach:
+    """How far a synthesis is carried by its disparity, in units of the baseline: up to `near` as it is, and up to `far` ever
+    more mixed with the warped corner views, which know what it has not seen."""
+
+    near: float
+    far: float
 
 
-def carried_share(distance: float) -> float:
+CARRIED = Reach(0.2, 0.3)  # between the two, both are equally near to what the networks would make there (docs/speed.md)
+# The corner views cost a software rasteriser three times as much as a synthesis that is carried: time which the networks, on
+# the same cores, need for the synthesis that would take its place.
+CARRIED_IN_SOFTWARE = Reach(0.5, 0.7)
+
+
+def carried_share(distance: float, reach: Reach = CARRIED) -> float:
     """Share of a synthesis, carried over this distance, in the picture on screen; the rest is that of the corner views."""
-    return min(max((CARRIED_FAR - distance) / (CARRIED_FAR - CARRIED_NEAR), 0.0), 1.0)
+    return min(max((reach.far - distance) / (reach.far - reach.near), 0.0), 1.0)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,12 +25,14 @@ from app.frametimes import FrameTimes
 from app.geometry import Rect
 from app.interface import Interface
 from app.opening import DEFAULT_MODEL, make_engine, offered_models, open_by_content, preview, synthesis_process, thumbnail_store
+from app.pacing import Pace
 from app.settings import SettingsFile, WindowPlace, default_path
 from app.surroundings import Keeping, Surroundings
 from app.window_place import fitted
 from assets import sample_path
 from lfcore.errors import LfviewError
 from lfcore.kept_files import default_root
+from lfcore.machine import core_count
 from lfcore.store import ViewStore
 
 TITLE = "lfview"
@@ -105,7 +108,7 @@ def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTime
             _window(make_engine(model, 512 * MEBIBYTE, process), model) as (window, controller),
         ):
             controller.open(path)
-            return frametimes.measure(controller, window.poll_and_draw, seconds, "window")
+            return frametimes.measure(controller, window.poll_and_draw, lambda: window.interval, seconds, "window")
     except NoDisplay:
         from app.offscreen import measure_frames_offscreen
 
@@ -178,7 +181,8 @@ class _Window:
         glfw.swap_interval(1)
         self._context = windowed_context(_Loader())
         self._target = self._context.detect_framebuffer(0)
-        self._interval = _frame_interval()
+        self._pace = Pace(_frame_interval(), core_count())
+        self._drawn_at = -math.inf  # when the last frame was begun
         self._interface: Interface | None = None
         self._touched_at = 0.0  # last event of mouse or keyboard
         self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
@@ -227,11 +231,11 @@ class _Window:
         """Draw frames as they are needed until the window is closed."""
         frames_due = _SETTLE_FRAMES
         while not glfw.window_should_close(self._window) and not self._at_hand.closing:
-            started = time.monotonic()
-            if frames_due > 0:
+            if frames_due > 0 and time.monotonic() >= self._drawn_at + self.interval:
                 frames_due -= 1
+                self._drawn_at = time.monotonic()
                 self.draw()
-            wait = self._wait_seconds(frames_due > 0, started)
+            wait = self._wait_seconds(frames_due > 0)
             before = time.monotonic()
             if wait > 0:
                 glfw.wait_events_timeout(wait)
@@ -253,6 +257,10 @@ class _Window:
 
     def draw(self) -> None:
         """Draw a frame and show it."""
+        with self._pace.frame():
+            self._draw()
+
+    def _draw(self) -> None:
         size = glfw.get_framebuffer_size(self._window)
         if min(size) == 0:
             return  # minimised
@@ -281,10 +289,16 @@ class _Window:
             raise RuntimeError("the window has no interface yet")
         return self._interface
 
-    def _wait_seconds(self, more_due: bool, started: float) -> float:
+    @property
+    def interval(self) -> float:
+        """The least time between the beginnings of two frames, in seconds."""
+        interface = self._at_hand
+        return self._pace.sharing if interface.in_software and interface.controller.synthesizing else self._pace.shortest
+
+    def _wait_seconds(self, more_due: bool) -> float:
         """How long to wait for events before the next frame; _IDLE_INTERVAL or more: there is nothing to draw until then."""
         now = time.monotonic()
-        to_next_frame = max(started + self._interval - now, 0.0)
+        to_next_frame = max(self._drawn_at + self.interval - now, 0.0)
         if more_due:
             return to_next_frame
         waits = [_IDLE_INTERVAL]

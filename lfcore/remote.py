@@ -24,6 +24,7 @@ import numpy as np
 
 from lfcore.errors import Cancelled, InputError, LfviewError
 from lfcore.lightfield import CORNERS, LightField
+from lfcore.machine import core_count
 from lfcore.remote_messages import (
     Cancel,
     Exchange,
@@ -67,6 +68,8 @@ class SynthesisProcess:
         self._made: dict[str, Made] = {}  # models that the running process has loaded
         self._light_field: LightField | None = None  # what it has taken
         self._number = 0  # of the latest query
+        self._cores = core_count()
+        self._spared = 0  # cores that are left to others by queries that share
 
     def __enter__(self) -> SynthesisProcess:
         return self
@@ -78,6 +81,10 @@ class SynthesisProcess:
         """Start the process now, where that has not been done: it loads torch at once. The first query would do it else."""
         with self._lock:
             self._running()
+
+    def share_processor(self) -> None:
+        """From now on queries that share leave a core to the program, where there is more than one."""
+        self._spared = 1
 
     def close(self) -> None:
         """End the process; a query that another thread waits for fails. The next query would start another."""
@@ -108,8 +115,11 @@ class SynthesisProcess:
         with self._lock:
             return self._loaded(model)
 
-    def synthesize(self, model: str, light_field: LightField, u: float, v: float, cancelled: Callable[[], bool]) -> Synthesis:
-        """See Synthesizer. Raises what the synthesizer raises, and LfviewError if the process has ended by itself."""
+    def synthesize(
+        self, model: str, light_field: LightField, u: float, v: float, cancelled: Callable[[], bool], shares: bool
+    ) -> Synthesis:
+        """See Synthesizer. shares: see `share_processor`. Raises what the synthesizer raises, and LfviewError if the process
+        has ended by itself."""
         while not self._lock.acquire(timeout=_CANCEL_SECONDS):
             if cancelled():
                 raise Cancelled
@@ -117,7 +127,8 @@ class SynthesisProcess:
             made = self._loaded(model)
             exchange = self._handed_over(light_field)
             self._number += 1
-            finished = self._ask(Synthesize(self._number, model, u, v), Finished, cancelled)
+            threads = max(self._cores - self._spared, 1) if shares else self._cores
+            finished = self._ask(Synthesize(self._number, model, u, v, threads), Finished, cancelled)
             disparity = exchange.disparity.copy() if finished.has_disparity else None
             return Synthesis(u, v, made.name, exchange.image.copy(), disparity, None, finished.timings)
         finally:
@@ -221,12 +232,14 @@ class SynthesisProcess:
 class RemoteSynthesizer:
     """A model in a SynthesisProcess; see lfcore.synthesis.Synthesizer. The warped inputs stay in the process.
 
-    Raises InputError or WeightsError where the model cannot be loaded.
+    shares: whether its queries leave a core to the program once SynthesisProcess.share_processor has been called. Raises
+    InputError or WeightsError where the model cannot be loaded.
     """
 
-    def __init__(self, process: SynthesisProcess, model: str) -> None:
+    def __init__(self, process: SynthesisProcess, model: str, shares: bool = False) -> None:
         self._process = process
         self._model = model
+        self._shares = shares
         made = process.load(model)
         self.name, self.key = made.name, made.key
         self._light_field: LightField | None = None
@@ -239,7 +252,7 @@ class RemoteSynthesizer:
         """See Synthesizer."""
         if self._light_field is None:
             raise InputError("No light field is set; call set_light_field first.")
-        return self._process.synthesize(self._model, self._light_field, u, v, cancelled)
+        return self._process.synthesize(self._model, self._light_field, u, v, cancelled, self._shares)
 
 
 def _shared_memory(size: int) -> SharedMemory:

@@ -43,6 +43,7 @@ class Synthesize:
     model: str
     u: float
     v: float
+    threads: int
 
 
 @dataclass(frozen=True)

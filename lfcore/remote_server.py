@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from functools import lru_cache
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
 
@@ -61,6 +62,22 @@ def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
                 connection.send(server.reply(request))
 
 
+def _use_threads(count: int) -> None:
+    """Let the networks use so many threads, or fewer where the person has said so (OMP_NUM_THREADS)."""
+    torch = sys.modules.get("torch")  # models without it have no threads
+    if torch is not None:
+        wanted = min(count, _most_threads())
+        if torch.get_num_threads() != wanted:
+            torch.set_num_threads(wanted)
+
+
+@lru_cache(maxsize=1)
+def _most_threads() -> int:
+    import torch
+
+    return torch.get_num_threads()  # asked before any other number is set
+
+
 class _Server:
     """The models that have been loaded and the light field that they are asked about."""
 
@@ -110,6 +127,7 @@ class _Server:
         if request.model not in self._prepared:
             synthesizer.set_light_field(self._light_field)
             self._prepared.add(request.model)
+        _use_threads(request.threads)
         synthesis = synthesizer.synthesize(request.u, request.v, self._cancelled(request.number))
         exchange.image[:] = synthesis.image
         if synthesis.disparity is not None:

@@ -16,7 +16,7 @@ from app.canvas import BACKGROUND, Canvas, Frame, Target
 from app.comparison import Source
 from app.engine import _pixels
 from app.geometry import Rect, Zoom, place
-from app.state import CARRIED_FAR, CARRIED_NEAR, Look
+from app.state import CARRIED, Look
 from app.tone import Curve, Tone
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
@@ -160,7 +160,7 @@ INSIDE = (slice(3, -3), slice(3, -3))  # what the edge, repeated by the bicubic 
 def test_a_synthesis_is_carried_to_viewpoints_nearby(canvas: Canvas) -> None:
     canvas.set_light_field(random_corners("uint8"))  # of no use: nothing of them may be seen
     give(canvas, truth(0.5, 0.5), np.full(SIZE, DISPARITY, np.float32), (0.5, 0.5))
-    for viewpoint in ((0.5, 0.5), (0.46, 0.53), (0.5 + CARRIED_NEAR, 0.5)):
+    for viewpoint in ((0.5, 0.5), (0.46, 0.53), (0.5 + CARRIED.near, 0.5)):
         shown = canvas.read(Frame(Look.SYNTHESIS, viewpoint))
         np.testing.assert_allclose(shown[INSIDE], truth(*viewpoint)[INSIDE], atol=2e-3 + EIGHT_BITS)
 
@@ -168,9 +168,9 @@ def test_a_synthesis_is_carried_to_viewpoints_nearby(canvas: Canvas) -> None:
 def test_farther_away_the_warped_corners_take_its_place_little_by_little(canvas: Canvas) -> None:
     canvas.set_light_field(np.zeros((4, *SIZE, 3), np.uint8))
     give(canvas, np.ones((*SIZE, 3), np.float32), np.zeros(SIZE, np.float32), (0.5, 0.5))
-    for distance in (0.05, 0.12, 0.15, 0.19, 0.25):
+    for distance in (0.05, 0.22, 0.25, 0.29, 0.35):
         shown = canvas.read(Frame(Look.SYNTHESIS, (0.5, 0.5 + distance)))
-        np.testing.assert_allclose(shown, np.interp(distance, (CARRIED_NEAR, CARRIED_FAR), (1, 0)), atol=1e-5)
+        np.testing.assert_allclose(shown, np.interp(distance, (CARRIED.near, CARRIED.far), (1, 0)), atol=1e-5)
 
 
 def test_a_moving_picture_fades_from_one_synthesis_to_the_next_both_carried(canvas: Canvas) -> None:

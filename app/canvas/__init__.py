@@ -1,8 +1,8 @@
 """Textures, passes and read-back: the only place that knows moderngl."""
 
 from app.canvas.canvas import Canvas
-from app.canvas.contexts import standalone_context, windowed_context
+from app.canvas.contexts import draws_in_software, standalone_context, windowed_context
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.magnifier import Colours
 
-__all__ = ["BACKGROUND", "Canvas", "Colours", "Frame", "Target", "standalone_context", "windowed_context"]
+__all__ = ["BACKGROUND", "Canvas", "Colours", "Frame", "Target", "draws_in_software", "standalone_context", "windowed_context"]

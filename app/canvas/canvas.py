@@ -28,7 +28,7 @@ from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
 from app.comparison import Source
 from app.geometry import Placement, Point, Rect, Size
 from app.layout import Strips
-from app.state import Look
+from app.state import CARRIED, Look, Reach
 from app.tone import Tone
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray
@@ -49,8 +49,8 @@ class _Makers:
     stereo: Stereo
 
     @staticmethod
-    def of(context: moderngl.Context, passes: Passes, textures: Textures) -> _Makers:
-        synthesized = Synthesized(passes, textures)
+    def of(context: moderngl.Context, passes: Passes, textures: Textures, reach: Reach) -> _Makers:
+        synthesized = Synthesized(passes, textures, reach)
         refocused = Refocused(context, passes, textures)
         return _Makers(
             textures,
@@ -67,12 +67,14 @@ class Canvas:
     """The picture in the window. All methods need the GL context to be current, on the thread that made the canvas.
 
     `picture_type`: moderngl's type of the pictures that are shown; "f1" is 8 bits, "f4" float32 to read them back exactly.
+    `reach`: how far a synthesis is carried, see app.state.
     """
 
-    def __init__(self, context: moderngl.Context, picture_type: str = "f1") -> None:
+    def __init__(self, context: moderngl.Context, picture_type: str = "f1", reach: Reach = CARRIED) -> None:
         self.context = context
         self.passes = Passes(context)
         self._picture_type = picture_type
+        self._reach = reach
         for fragment in ("blend.frag", "instant.frag", "exact.frag", "fade.frag"):
             self.passes.get(fragment)  # compiled now, so that the hand's first movement does not wait for them
         for fade in ("fade_none.glsl", "fade_older.glsl"):
@@ -96,7 +98,8 @@ class Canvas:
                 f"open a light field with smaller views."
             )
         self.clear()
-        self._makers = _Makers.of(self.context, self.passes, Textures(self.context, corners, self._picture_type))
+        textures = Textures(self.context, corners, self._picture_type)
+        self._makers = _Makers.of(self.context, self.passes, textures, self._reach)
 
     def warm_up(self, target: Target) -> None:
         """Run every pass of the moving picture once on a made-up light field, into the target; there must be no other.

@@ -7,12 +7,19 @@ import moderngl
 from lfcore.errors import LfviewError
 
 GL_VERSION = 330
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "software")  # in names of renderers that have no GPU
 
 
 def windowed_context(load_function: object) -> moderngl.Context:
     """The GL context that is current on this thread; `load_function` has a method load_opengl_function(name) -> address."""
     moderngl.init_context(load_function)
     return moderngl.get_context()
+
+
+def draws_in_software(context: moderngl.Context) -> bool:
+    """Whether the processor does the graphics' work."""
+    renderer = str(context.info["GL_RENDERER"]).lower()
+    return any(name in renderer for name in _SOFTWARE)
 
 
 def standalone_context() -> moderngl.Context:

@@ -9,7 +9,7 @@ import moderngl
 from app.canvas.passes import AnyTexture, Passes, Uniform
 from app.canvas.textures import Textures
 from app.geometry import Point
-from app.state import CARRIED_FAR
+from app.state import CARRIED
 from app.tone import Tone
 
 
@@ -29,7 +29,7 @@ def draw_elsewhere(
     """
     made_at = textures.made_at
     assert made_at is not None
-    near = made_at == textures.newest_at and math.dist(at, made_at) <= CARRIED_FAR
+    near = made_at == textures.newest_at and math.dist(at, made_at) <= CARRIED.far
     sampled: dict[str, AnyTexture] = {"disparity_map": textures.disparity_map}
     uniforms: dict[str, Uniform] = {
         "made_at": made_at,

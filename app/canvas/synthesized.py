@@ -10,7 +10,7 @@ import moderngl
 from app.canvas.passes import AnyTexture, Passes, Uniform
 from app.canvas.textures import Picture, Textures
 from app.geometry import Point
-from app.state import carried_share
+from app.state import Reach, carried_share
 from app.tone import Tone
 
 
@@ -18,9 +18,10 @@ class Synthesized:
     """Makes the picture of a viewpoint at the light field's own size. Each part is made anew only if what it shows has
     changed."""
 
-    def __init__(self, passes: Passes, textures: Textures) -> None:
+    def __init__(self, passes: Passes, textures: Textures, reach: Reach) -> None:
         self._passes = passes
         self._textures = textures
+        self._reach = reach
 
     def picture(self, viewpoint: Point, share: float, tone: Tone) -> Picture:
         """The best picture of this viewpoint that can be made. share: how far the newest synthesis has been faded in."""
@@ -38,7 +39,7 @@ class Synthesized:
             return self._mixed(self._corners(viewpoint, False, tone), after, share)
         if textures.made_at != newest:  # it has come without a disparity map, and so cannot be carried
             return self._corners(viewpoint, textures.made_at is not None, tone)
-        near = carried_share(math.dist(newest, viewpoint))
+        near = carried_share(math.dist(newest, viewpoint), self._reach)
         if near <= 0.0:
             return self._corners(viewpoint, True, tone)
         after = self._carried(viewpoint, older, share, tone)
