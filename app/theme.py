@@ -104,7 +104,22 @@ def change_scale(scale: float) -> None:
     rescale(style, scale)
 
 
+def _unscale(style: imgui.Style) -> None:
+    """Give every size that imgui scales its first value again; scaling would multiply one scale by the other."""
+    fresh, scaled = imgui.Style(), imgui.Style()
+    scaled.scale_all_sizes(2.0)
+    for name in dir(fresh):
+        value = getattr(fresh, name)
+        if isinstance(value, float) and value != getattr(scaled, name):
+            setattr(style, name, value)
+        elif isinstance(value, ImVec2):
+            other = getattr(scaled, name)
+            if (value.x, value.y) != (other.x, other.y):
+                setattr(style, name, ImVec2(value.x, value.y))
+
+
 def _shapes(style: imgui.Style) -> None:
+    _unscale(style)
     style.window_padding = ImVec2(16, 14)
     style.frame_padding = ImVec2(8, 4)
     style.item_spacing = ImVec2(8, 6)

@@ -49,6 +49,25 @@ def test_the_grounds_are_neutral(chosen: Theme) -> None:
         assert max(parts) - min(parts) <= 6 / 255
 
 
+def sizes(imgui: Any) -> dict[str, object]:
+    style = imgui.get_style()
+    values = {name: getattr(style, name) for name in dir(style) if not name.startswith("_")}
+    numbers = {name: value for name, value in values.items() if isinstance(value, int | float)}
+    pairs = {name: (value.x, value.y) for name, value in values.items() if isinstance(value, imgui.ImVec2)}
+    return {**numbers, **pairs}
+
+
+def test_one_scale_after_another_is_the_last_alone(imgui_context: Any) -> None:
+    theme.apply(1.5)
+    fresh = sizes(imgui_context)
+    for scale in (3.0, 1.0, 2.25, 1.5):
+        theme.change_scale(scale)
+    assert sizes(imgui_context) == fresh
+    assert fresh["separator_size"] == 1.0  # imgui rounds down
+    theme.change_scale(3.0)
+    assert sizes(imgui_context)["separator_size"] == 3.0
+
+
 def test_a_change_reaches_imgui_and_what_has_been_handed_out(imgui_context: Any) -> None:
     held = theme.TEXT
     theme.apply(1.0)
