@@ -315,8 +315,6 @@ class Controller:
         if stop.focus is not None:
             self.state.focusing = replace(self.state.focusing, aperture=choices.aperture)
             self.state.refocus_at(stop.focus)
-            if stop.focus is not None:
-                self.state.refocus_at(stop.focus)
 
     def _pick(self) -> None:
         """Focus on the point that was clicked, as soon as its disparity is known."""

@@ -62,6 +62,7 @@ class Interface:
         self._scale = scale
         self._light_field: LightField | None = None  # what the canvas has taken
         self._answer: Answer | None = None
+        self._model = ""  # of the newest picture for a hand at rest
         self._captured: int | None = None
         self._partner: Answer | None = None
         self._map: FloatArray | None = None
@@ -242,6 +243,9 @@ class Interface:
             synthesis = answer.synthesis
             canvas.set_synthesis(synthesis.image, answer.pixels, synthesis.disparity, (synthesis.u, synthesis.v))
             self._answer = answer
+            if answer.final and synthesis.model != self._model:
+                self._model = synthesis.model
+                canvas.redraw_between()
         captured = controller.captured_here
         if captured is not None and captured != self._captured:
             canvas.set_captured(light_field.views[divmod(captured, light_field.columns)])

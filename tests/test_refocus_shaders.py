@@ -175,6 +175,8 @@ def test_a_nearer_synthesis_makes_views_in_between_anew(bench: Any) -> None:
     assert made.finished(wanted) == pytest.approx(0.6, abs=0.01)
     made.give(np.full((scene.height, scene.width, 3), 0.9, np.float32), flat, (0.1, 0.0))  # not nearer
     assert made.finished(wanted) == pytest.approx(0.6, abs=0.01)
+    made.refocused.redraw_between()  # by another model
+    assert made.finished(wanted) == pytest.approx(0.9, abs=0.01)
 
 
 def test_of_a_large_light_field_fewer_views_are_taken(gl: Any) -> None:

@@ -167,6 +167,10 @@ class Canvas:
         """
         self._at_hand.refocused.set_views(views, dark)
 
+    def redraw_between(self) -> None:
+        """Draw the views in between that refocusing sums up anew, from what is now at hand: another model has come."""
+        self._at_hand.refocused.redraw_between()
+
     def set_partner(self, image: FloatArray) -> None:
         """Take the synthesis of the viewpoint by another model (H, W, 3), to be compared with or looked at."""
         self._at_hand.compared.set_partner(image)

@@ -154,6 +154,10 @@ class Synthesized(Gathered):
             self.filled[index] = True
             self.version += 1
 
+    def redraw(self) -> None:
+        """Draw all of them anew; those that are there stay until then."""
+        self._distance[:] = np.inf
+
     def _gains(self) -> npt.NDArray[np.intp]:
         """The views that are worth being drawn now, in order."""
         made_at = self._textures.made_at

@@ -70,11 +70,10 @@ class Refocused:
         """Take the captured views (V, U, H, W, 3), of which `dark` ones, by row and column, are left out."""
         self._views = (views, dark)
 
-    def forget_synthesized(self) -> None:
-        """Draw views in between anew, by another model's disparity."""
+    def redraw_between(self) -> None:
+        """Draw views in between anew."""
         if self._synthesized is not None:
-            self._synthesized.release()
-            self._synthesized = None
+            self._synthesized.redraw()
 
     def advance(self, wanted: Wanted) -> bool:
         """Do the part of one frame; whether more is to be done in the next."""
