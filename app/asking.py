@@ -37,6 +37,7 @@ class Wish:
     task: Task
     at: Point
     model: str = ""
+    weighed: bool = False  # with the weights of the inputs, where the model can tell them
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class Asking:
             if wish.task is Task.QUICK:
                 answer = engine.quick_answer(light_field, u, v, cancelled)
             elif wish.task is Task.FINAL:
-                answer = engine.answer(light_field, u, v, cancelled)
+                answer = engine.answer(light_field, u, v, cancelled, wish.weighed)
             elif wish.task is Task.COMPARE:
                 answer = engine.answer_by(wish.model, light_field, u, v, cancelled)
             elif wish.task is Task.SCORE:

@@ -282,6 +282,7 @@ class Controller:
             captured_here=self.captured_here,
             compared=self._compared(),
             focus=self._focus_facts(),
+            weighed=newest is not None and newest.synthesis.weights is not None,
             samples=self._samples(),
             captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
             value_under_cursor=self._value_under_cursor(),
@@ -516,11 +517,14 @@ class Controller:
         here, picture = self.viewpoint, self.picture
         if self._engine.failed:
             return Wish(Task.QUICK, here) if self._engine.quick and picture is None else None
-        if picture is None or not picture.final or (picture.score is None and self.captured_here is not None):
+        weighed = self.state.look is Look.LEAN and self._engine.weighs
+        unscored = picture is not None and picture.score is None and self.captured_here is not None
+        unweighed = picture is not None and picture.synthesis.weights is None and weighed
+        if picture is None or not picture.final or unscored or unweighed:
             moving = not self._resting or (self.newest is None and not self._faulted)
             if self._engine.quick and moving and (picture is None or not picture.final):
                 return Wish(Task.QUICK, here) if picture is None else None
-            return Wish(Task.FINAL, here)
+            return Wish(Task.FINAL, here, weighed=weighed)
         return self._wanted_later(light_field) if self._resting else None
 
     def _compare(self, light_field: LightField) -> None:

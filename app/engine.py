@@ -19,7 +19,7 @@ from lfcore.errors import InputError, LfviewError, OutputError, WeightsError
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import to_uint8
 from lfcore.store import ViewStore
-from lfcore.synthesis import Synthesis, Synthesizer
+from lfcore.synthesis import Synthesis, Synthesizer, WeighingSynthesizer, weighs
 
 MakeSynthesizer = Callable[[], Synthesizer]
 
@@ -72,11 +72,13 @@ class _Model:
                 raise
         return self.synthesizer
 
-    def synthesize(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Synthesis:
+    def synthesize(self, light_field: LightField, u: float, v: float, cancelled: Cancel, weighed: bool = False) -> Synthesis:
         synthesizer = self.prepare()
         if self._light_field is not light_field:
             synthesizer.set_light_field(light_field)
             self._light_field = light_field
+        if weighed and isinstance(synthesizer, WeighingSynthesizer):
+            return synthesizer.synthesize_weighed(u, v, cancelled)
         return synthesizer.synthesize(u, v, cancelled)
 
 
@@ -141,14 +143,20 @@ class Engine:
         """Whether there is a model for a hand that moves."""
         return self._stands_in and self._quick is not None and self._quick.failure is None
 
+    @property
+    def weighs(self) -> bool:
+        """Whether the model for a hand at rest can tell how much of each input is in its picture."""
+        return self._final.synthesizer is not None and weighs(self._final.synthesizer)
+
     def quick_answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
         """The synthesis of (u, v) by the model for a hand that moves. It is not kept: making it again is quick."""
         assert self._quick is not None
         return _answer(self._quick.synthesize(light_field, u, v, cancelled), final=False, kept=False, score=None)
 
-    def answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
-        """The synthesis of (u, v), from memory, from disk or by the model, with its score."""
-        return self._answered(self._final, light_field, u, v, cancelled)
+    def answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel, weighed: bool = False) -> Answer:
+        """The synthesis of (u, v), from memory, from disk or by the model, with its score. weighed: with the weights of the
+        inputs too, where the model can tell them; then it may have to be made again."""
+        return self._answered(self._final, light_field, u, v, cancelled, weighed and self.weighs)
 
     def answer_by(self, name: str, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
         """The same by a known model, whichever serves the hand."""
@@ -179,8 +187,12 @@ class Engine:
         of = (light_field.content_key, synthesizer.key)
         return {(key.u, key.v): found for key, found in self._scores.copy().items() if (key.content, key.model) == of}
 
-    def _answered(self, model: _Model, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
+    def _answered(
+        self, model: _Model, light_field: LightField, u: float, v: float, cancelled: Cancel, weighed: bool = False
+    ) -> Answer:
         known = self._cached(model, light_field, u, v)
+        if weighed and (known is None or known.synthesis.weights is None):
+            return self._weighed(model, light_field, u, v, cancelled)
         if known is not None and (known.score is not None or light_field.at(u, v) is None):
             return known
         key = cache_key(light_field, model.prepare(), u, v)
@@ -192,6 +204,15 @@ class Engine:
                 self._unsaved[key] = None
         self.cache.put(key, synthesis)
         return _answer(synthesis, final=True, kept=kept, score=self._keep_score(light_field, key, synthesis))
+
+    def _weighed(self, model: _Model, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
+        """Made by the model in any case, since weights are not kept on disk."""
+        key = cache_key(light_field, model.prepare(), u, v)
+        synthesis = model.synthesize(light_field, u, v, cancelled, weighed=True)
+        self.cache.put(key, synthesis)
+        if self._store is not None and (key.u, key.v) not in self._stored:
+            self._unsaved[key] = None
+        return _answer(synthesis, final=True, kept=False, score=self._keep_score(light_field, key, synthesis))
 
     def _keep_score(self, light_field: LightField, key: CacheKey, synthesis: Synthesis) -> ScoreText | None:
         found = _score(light_field, synthesis)

@@ -241,7 +241,8 @@ class Interface:
         answer = controller.newest
         if answer is not None and answer is not self._answer:
             synthesis = answer.synthesis
-            canvas.set_synthesis(synthesis.image, answer.pixels, synthesis.disparity, (synthesis.u, synthesis.v))
+            at = synthesis.u, synthesis.v
+            canvas.set_synthesis(synthesis.image, answer.pixels, synthesis.disparity, at, synthesis.weights)
             self._answer = answer
             if answer.final and synthesis.model != self._model:
                 self._model = synthesis.model

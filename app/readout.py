@@ -72,6 +72,7 @@ class Readout:
     captured_here: int | None = None  # number of the captured view at (u, v)
     compared: Compared = field(default_factory=Compared)
     focus: FocusFacts = field(default_factory=FocusFacts)
+    weighed: bool = False  # the weights of the inputs in the newest synthesis are known
     samples: Samples | None = None  # the values behind the picture, where they are known
     captions: tuple[Caption, ...] = ()  # of what a Lytro file without raw shows; `kind` then says what it is
     value_under_cursor: float | None = None  # in the unit of the caption

@@ -76,6 +76,7 @@ class Samples:
     captured: npt.NDArray[np.generic] | None = None
     partner: npt.NDArray[np.generic] | None = None
     shows_captured: bool = False
+    weights: npt.NDArray[np.uint8] | None = None  # (4, H, W), of the inputs in the image, 255 = whole
     _last: dict[object, Patch | None] = field(default_factory=dict, repr=False)  # what was asked for last
 
     def holds(self, part: Part) -> bool:
@@ -128,7 +129,11 @@ class Samples:
         return Patch(part, 100 * shares, shares @ np.array(CORNER_COLOURS, np.float32), 0, "% of the inputs")
 
     def shares(self, part: Part) -> FloatArray:
-        """How like the picture is to each warped input around each pixel: (h, w, 4), in the order of CORNERS, sum 1."""
+        """How much of each warped input is in the picture, (h, w, 4) in the order of CORNERS, sum 1: by weights, or where the
+        model has told none by how like the picture is to each around the pixel."""
+        if self.weights is not None:
+            found = np.moveaxis(self.weights[:, *part.slices], 0, 2).astype(np.float32)
+            return found / np.maximum(found.sum(2, keepdims=True), 1)
         assert self.disparity is not None
         height, width = self.disparity.shape
         wide = Part(
@@ -138,8 +143,8 @@ class Samples:
             min(part.bottom + LEAN_REACH, height),
         )
         image = self.image[wide.slices]
-        found = [np.where(inside, np.square(seen - image).sum(2), np.float32(1)) for seen, inside in self._all_warped(wide)]
-        distances = np.stack([*found, np.ones_like(found[0])], axis=2)  # (., ., 5); the last counts the pixels
+        squares = [np.where(inside, np.square(seen - image).sum(2), np.float32(1)) for seen, inside in self._all_warped(wide)]
+        distances = np.stack([*squares, np.ones_like(squares[0])], axis=2)  # (., ., 5); the last counts the pixels
         before = (LEAN_REACH - (part.top - wide.top), LEAN_REACH - (part.left - wide.left))
         after = (LEAN_REACH - (wide.bottom - part.bottom), LEAN_REACH - (wide.right - part.right))
         padded = np.pad(distances, ((before[0], after[0]), (before[1], after[1]), (0, 0)))

@@ -26,6 +26,7 @@ class Sampler:
             last is None
             or last.light_field is not light_field
             or last.image is not synthesis.image
+            or last.weights is not synthesis.weights
             or (last.viewpoint, last.shows_captured) != (viewpoint, shows_captured)
             or self._partner is not partner
             or self._source is not source
@@ -33,6 +34,7 @@ class Sampler:
             place = light_field.at(*viewpoint)
             captured = light_field.views[place] if place is not None else None
             against = captured if source is Source.CAPTURED else partner.synthesis.image if partner is not None else None
-            last = Samples(light_field, viewpoint, synthesis.image, synthesis.disparity, captured, against, shows_captured)
+            arrays = (synthesis.image, synthesis.disparity, captured, against)
+            last = Samples(light_field, viewpoint, *arrays, shows_captured, synthesis.weights)
             self._samples, self._partner, self._source = last, partner, source
         return last

@@ -75,8 +75,12 @@ class CompactInference:
         return weights.mul_(near).sum(1)
 
     def colour(self, warped: Tensor, disparity: Tensor, positions: Tensor) -> Tensor:
+        """As `weighed_colour`, the picture alone."""
+        return self.weighed_colour(warped, disparity, positions)[0]
+
+    def weighed_colour(self, warped: Tensor, disparity: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
         """Phases of the warped inputs (4, 3, 4, h, w) less 0.5, in the root tone, and of the disparity (4, h, w); positions
-        (1, 2). Returns the phases of the picture (3, 4, h, w), stored values."""
+        (1, 2). Returns the phases of the picture (3, 4, h, w), stored values, and the weights of the inputs (4, 4, h, w)."""
         h, w = disparity.shape[-2:]
         x = torch.empty(1, 64, h, w, dtype=self.dtype)
         mean = warped.mean(0)  # (3, 4, h, w)
@@ -93,7 +97,7 @@ class CompactInference:
         blended = residual.mul_(0.1).add_(0.5)
         for share, part in zip(weights, warped, strict=True):
             blended.addcmul_(share, part)
-        return stored_from_root(blended)
+        return stored_from_root(blended), weights
 
 
 def full_size(phases: Tensor) -> Tensor:

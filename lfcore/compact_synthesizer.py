@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from functools import cached_property
 from typing import cast
@@ -62,7 +63,26 @@ class CompactSynthesizer:
         self._shifted = root_tone(padded).sub_(0.5)
         self._luma = sweep_input(half_luma(padded).unsqueeze(1))
 
+    @property
+    def weighs(self) -> bool:
+        """See WeighingSynthesizer."""
+        return True
+
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        synthesis, warped, _ = self._computed(u, v, cancelled)
+        inside = slice(self._size[0]), slice(self._size[1])
+        return synthesis.with_warped(lambda: _picture_of_warped(warped, inside))
+
+    def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        """See WeighingSynthesizer; it is put together without the warped inputs."""
+        synthesis, _, weights = self._computed(u, v, cancelled)
+        height, width = self._size
+        with torch.inference_mode():
+            shares = full_size(weights)[:, :height, :width].mul_(255).round_().to(torch.uint8)
+        return dataclasses.replace(synthesis, weights=shares.contiguous().numpy())
+
+    def _computed(self, u: float, v: float, cancelled: Callable[[], bool]) -> tuple[LateSynthesis, Tensor, Tensor]:
+        """The synthesis without warped inputs, the phases of these (4, 3, 4, h, w), and of the weights (4, 4, h, w)."""
         if self._shifted is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
@@ -82,7 +102,8 @@ class CompactSynthesizer:
             warped = _warped_phases(self._shifted, disparity, offsets)  # (4, 3, 4, h, w)
             clock.lap("warp")
             check_cancelled(cancelled)
-            image = self._networks.colour(warped, disparity, torch.tensor([[u, v]])).clamp_(0, 1)  # (3, 4, h, w)
+            image, weights = self._networks.weighed_colour(warped, disparity, torch.tensor([[u, v]]))
+            image = image.clamp_(0, 1)  # (3, 4, h, w)
             clock.lap("colour")
             inside = slice(self._size[0]), slice(self._size[1])
             synthesis = LateSynthesis(
@@ -94,7 +115,7 @@ class CompactSynthesizer:
                 None,
                 clock.timings(),
             )
-        return synthesis.with_warped(lambda: _picture_of_warped(warped, inside))
+        return synthesis, warped, weights
 
 
 class LateSynthesis(Synthesis):

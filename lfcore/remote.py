@@ -53,7 +53,7 @@ class SynthesisProcess:
     """A process in which synthesizers run. Safe to use from threads, which wait for each other.
 
     make: what loads models there, a function of a module. niceness: how far it stands back behind other programs, where the
-    system knows that (0 to 19). Memory: the corner views and one synthesis, 16 to 48 bytes a pixel, are shared; what the
+    system knows that (0 to 19). Memory: the corner views and one synthesis, 20 to 48 bytes a pixel, are shared; what the
     networks need is the process's own.
     """
 
@@ -116,10 +116,21 @@ class SynthesisProcess:
             return self._loaded(model)
 
     def synthesize(
-        self, model: str, light_field: LightField, u: float, v: float, cancelled: Callable[[], bool], shares: bool
+        self,
+        model: str,
+        light_field: LightField,
+        at: tuple[float, float],
+        cancelled: Callable[[], bool],
+        *,
+        weighed: bool,
+        shares: bool,
     ) -> Synthesis:
-        """See Synthesizer. shares: see `share_processor`. Raises what the synthesizer raises, and LfviewError if the process
-        has ended by itself."""
+        """The view at (u, v), with weights where that is wished and the model has them; see WeighingSynthesizer.
+
+        shares: see `share_processor`.
+        Raises what the synthesizer raises, and LfviewError if the process has ended by itself.
+        """
+        u, v = at
         while not self._lock.acquire(timeout=_CANCEL_SECONDS):
             if cancelled():
                 raise Cancelled
@@ -128,9 +139,10 @@ class SynthesisProcess:
             exchange = self._handed_over(light_field)
             self._number += 1
             threads = max(self._cores - self._spared, 1) if shares else self._cores
-            finished = self._ask(Synthesize(self._number, model, u, v, threads), Finished, cancelled)
+            finished = self._ask(Synthesize(self._number, model, u, v, threads, weighed), Finished, cancelled)
             disparity = exchange.disparity.copy() if finished.has_disparity else None
-            return Synthesis(u, v, made.name, exchange.image.copy(), disparity, None, finished.timings)
+            weights = exchange.weights.copy() if finished.has_weights else None
+            return Synthesis(u, v, made.name, exchange.image.copy(), disparity, None, finished.timings, weights)
         finally:
             self._lock.release()
 
@@ -241,7 +253,7 @@ class RemoteSynthesizer:
         self._model = model
         self._shares = shares
         made = process.load(model)
-        self.name, self.key = made.name, made.key
+        self.name, self.key, self.weighs = made.name, made.key, made.weighs
         self._light_field: LightField | None = None
 
     def set_light_field(self, light_field: LightField) -> None:
@@ -250,9 +262,18 @@ class RemoteSynthesizer:
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         """See Synthesizer."""
+        return self._asked((u, v), cancelled, weighed=False)
+
+    def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        """See WeighingSynthesizer."""
+        return self._asked((u, v), cancelled, weighed=True)
+
+    def _asked(self, at: tuple[float, float], cancelled: Callable[[], bool], weighed: bool) -> Synthesis:
         if self._light_field is None:
             raise InputError("No light field is set; call set_light_field first.")
-        return self._process.synthesize(self._model, self._light_field, u, v, cancelled, self._shares)
+        return self._process.synthesize(
+            self._model, self._light_field, at, cancelled, weighed=weighed, shares=self._shares
+        )
 
 
 def _shared_memory(size: int) -> SharedMemory:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lfcore.lightfield import CORNERS, FloatArray
-from lfcore.synthesis import Synthesizer
+from lfcore.synthesis import ByteArray, Synthesizer
 
 MakeSynthesizer = Callable[[str], Synthesizer]
 
@@ -44,6 +44,7 @@ class Synthesize:
     u: float
     v: float
     threads: int
+    weighed: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ class Made:
 
     name: str
     key: str
+    weighs: bool
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class Finished:
     """The view lies in the shared memory."""
 
     has_disparity: bool
+    has_weights: bool
     timings: Mapping[str, float]
 
 
@@ -86,7 +89,8 @@ Reply = Made | Taken | Finished | Failed
 
 
 class Exchange:
-    """Arrays in shared memory: first the corner views (4, H, W, 3), as stored, then the image and the disparity of one view."""
+    """Arrays in shared memory: first the corner views (4, H, W, 3), as stored, then image, disparity and weights of one
+    view."""
 
     def __init__(self, memory: SharedMemory, shape: tuple[int, int], dtype: npt.DTypeLike) -> None:
         self._memory = memory
@@ -94,14 +98,16 @@ class Exchange:
         self.corners: npt.NDArray[np.generic] = np.ndarray((len(CORNERS), height, width, 3), dtype, memory.buf)
         self.image: FloatArray = np.ndarray((height, width, 3), np.float32, memory.buf)
         self.disparity: FloatArray = np.ndarray((height, width), np.float32, memory.buf, self.image.nbytes)
+        before = self.image.nbytes + self.disparity.nbytes
+        self.weights: ByteArray = np.ndarray((len(CORNERS), height, width), np.uint8, memory.buf, before)
 
     @staticmethod
     def size(shape: tuple[int, int], dtype: npt.DTypeLike) -> int:
         """Bytes needed for pictures of this (H, W)."""
         pixels = shape[0] * shape[1]
-        return max(3 * len(CORNERS) * np.dtype(dtype).itemsize, 4 * 4) * pixels
+        return max(3 * len(CORNERS) * np.dtype(dtype).itemsize, 4 * 4 + len(CORNERS)) * pixels
 
     def close(self) -> None:
         """Let go of the memory; the arrays must not be used any more."""
-        del self.corners, self.image, self.disparity
+        del self.corners, self.image, self.disparity, self.weights
         self._memory.close()

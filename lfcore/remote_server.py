@@ -30,7 +30,7 @@ from lfcore.remote_messages import (
     Take,
     Taken,
 )
-from lfcore.synthesis import Synthesizer
+from lfcore.synthesis import Synthesizer, WeighingSynthesizer, weighs
 
 _log = logging.getLogger(__name__)
 
@@ -103,7 +103,7 @@ class _Server:
         if isinstance(request, Make):
             synthesizer = self._make(request.model)
             self._synthesizers[request.model] = synthesizer
-            return Made(synthesizer.name, synthesizer.key)
+            return Made(synthesizer.name, synthesizer.key, weighs(synthesizer))
         if isinstance(request, Take):
             self._take(request)
             return Taken()
@@ -128,11 +128,16 @@ class _Server:
             synthesizer.set_light_field(self._light_field)
             self._prepared.add(request.model)
         _use_threads(request.threads)
-        synthesis = synthesizer.synthesize(request.u, request.v, self._cancelled(request.number))
+        ask = synthesizer.synthesize
+        if request.weighed and isinstance(synthesizer, WeighingSynthesizer):
+            ask = synthesizer.synthesize_weighed
+        synthesis = ask(request.u, request.v, self._cancelled(request.number))
         exchange.image[:] = synthesis.image
         if synthesis.disparity is not None:
             exchange.disparity[:] = synthesis.disparity
-        return Finished(synthesis.disparity is not None, dict(synthesis.timings))
+        if synthesis.weights is not None:
+            exchange.weights[:] = synthesis.weights
+        return Finished(synthesis.disparity is not None, synthesis.weights is not None, dict(synthesis.timings))
 
     def _cancelled(self, number: int) -> Callable[[], bool]:
         """Whether the program has taken its query back."""

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
 
 from lfcore.lightfield import FloatArray, LightField
+
+ByteArray = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -20,6 +25,7 @@ class Synthesis:
     disparity: FloatArray | None  # (H, W); None where the model has none
     warped: FloatArray | None  # (4, H, W, 3) in the order of CORNERS
     timings: Mapping[str, float]  # seconds by stage: features, disparity, warp, colour, total
+    weights: ByteArray | None = None  # (4, H, W), the inputs' shares in the image, 255 = whole; only where asked for
 
 
 def never() -> bool:
@@ -43,3 +49,20 @@ class Synthesizer(Protocol):
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         """The view at (u, v). Raises InputError outside the allowed range, Cancelled once `cancelled()` holds."""
+
+
+@runtime_checkable
+class WeighingSynthesizer(Synthesizer, Protocol):
+    """A model whose image may be a weighted sum of the warped inputs, and which can tell the weights."""
+
+    @property
+    def weighs(self) -> bool:
+        """Whether it is such a sum."""
+
+    def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        """As `synthesize`, with the weights."""
+
+
+def weighs(synthesizer: Synthesizer) -> bool:
+    """Whether the synthesizer can tell weights."""
+    return isinstance(synthesizer, WeighingSynthesizer) and synthesizer.weighs

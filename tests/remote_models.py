@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,8 +18,8 @@ PATIENT_SECONDS = 30.0
 
 def blend(corners: FloatArray, u: float, v: float) -> FloatArray:
     """Corner views (4, H, W, 3) by their nearness to (u, v): tells them apart by place."""
-    weights = [abs(1 - cu - u) * abs(1 - cv - v) for cu, cv in CORNERS]
-    return np.tensordot(np.array(weights, np.float32), corners, 1)
+    return sum((np.float32(abs(1 - cu - u) * abs(1 - cv - v)) * view for (cu, cv), view in zip(CORNERS, corners, strict=True)),
+               np.zeros_like(corners[0]))
 
 
 class Blender:
@@ -55,8 +56,21 @@ class Blender:
         return Synthesis(u, v, self.name, image, disparity, None, {"total": 0.5})
 
 
+class Weigher(Blender):
+    """The same, and tells the shares of the corners."""
+
+    weighs = True
+
+    def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = lambda: False) -> Synthesis:
+        synthesis = self.synthesize(u, v, cancelled)
+        shares = [np.full(synthesis.image.shape[:2], 255 * abs(1 - cu - u) * abs(1 - cv - v), np.uint8) for cu, cv in CORNERS]
+        return replace(synthesis, weights=np.stack(shares))
+
+
 def make(model: str) -> Synthesizer:
     """The model of that name."""
+    if model == "weigher":
+        return Weigher(model)
     if model == "missing":
         raise InputError("There is no such model.")
     if model == "threads":

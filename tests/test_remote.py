@@ -251,7 +251,7 @@ def test_too_little_shared_memory_is_said(monkeypatch: pytest.MonkeyPatch, proce
     if not Path("/dev/shm").is_dir():
         pytest.skip("this system keeps shared memory elsewhere")
     monkeypatch.setattr(remote.shutil, "disk_usage", lambda path: SimpleNamespace(free=2**20))
-    with pytest.raises(LfviewError, match=r"1 MiB left, but this light field needs 5 MiB"):
+    with pytest.raises(LfviewError, match=r"1 MiB left, but this light field needs 6 MiB"):
         asked(process, "blender", light_field(500, 600))
     monkeypatch.undo()
     asked(process, "blender", light_field())

@@ -137,9 +137,16 @@ class Canvas:
             self._makers = None
         self.unfinished = False
 
-    def set_synthesis(self, image: FloatArray, pixels: _Bytes, disparity: FloatArray | None, viewpoint: Point) -> None:
+    def set_synthesis(
+        self,
+        image: FloatArray,
+        pixels: _Bytes,
+        disparity: FloatArray | None,
+        viewpoint: Point,
+        weights: _Bytes | None = None,
+    ) -> None:
         """Take the newest synthesis: image (H, W, 3), the same as uint8 (H, W, 4), disparity (H, W) in px over the baseline
-        or None, and its (u, v).
+        or None, its (u, v), and where they are known the weights (4, H, W) of the inputs in it, 255 = whole.
 
         The one before is kept for the cross-fade. Both are carried in 8 bits, which costs a software rasteriser half the time.
         """
@@ -153,6 +160,9 @@ class Canvas:
             textures.disparity_map.write(np.ascontiguousarray(disparity, np.float32))
             textures.nearest_disparity = float(disparity.min())
             textures.made_at = viewpoint
+        textures.weighed = weights is not None and disparity is not None
+        if weights is not None:
+            textures.weights.write(np.ascontiguousarray(np.moveaxis(weights, 0, 2)))
         textures.current.clear()
 
     def set_captured(self, view: npt.NDArray[np.generic]) -> None:

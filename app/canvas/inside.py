@@ -53,10 +53,19 @@ class Inside:
         return result.texture
 
     def lean(self, viewpoint: Point, share: float) -> moderngl.Texture:
-        """Which warped input the picture is most like, in the colours CORNER_COLOURS."""
+        """Which warped input the picture leans on, in the colours CORNER_COLOURS: by the weights of the newest synthesis, or
+        where it has none by likeness."""
         textures = self._textures
         result = textures.inner
-        if result.outdated("lean", viewpoint, share):
+        if not result.outdated("lean", viewpoint, share):
+            return result.texture
+        if textures.weighed:
+            result.target.use()
+            self._passes.get("lean_weights.frag").render(
+                {"weights": textures.weights, "disparity_map": textures.disparity_map},
+                {**self._synthesized.carrying(viewpoint), "corner_colours": CORNER_COLOURS},
+            )
+        else:
             disparity = self._synthesized.carry_disparity(viewpoint)
             picture = self._synthesized.picture(viewpoint, share, Tone())
             textures.distances.target.use()

@@ -63,7 +63,7 @@ class Synthesized:
                 "corner_views": textures.corner_views,
                 "disparity_map": textures.disparity_map,
             }
-            self._passes.toned("instant.frag", tone).render(sampled, self._carrying(viewpoint))
+            self._passes.toned("instant.frag", tone).render(sampled, self.carrying(viewpoint))
         return result
 
     def carry_disparity(self, viewpoint: Point) -> moderngl.Texture:
@@ -71,7 +71,7 @@ class Synthesized:
         textures = self._textures
         if textures.made_at is not None and textures.outdated("disparity", viewpoint):
             textures.disparity_target.use()
-            self._passes.get("carry.frag").render({"disparity_map": textures.disparity_map}, self._carrying(viewpoint))
+            self._passes.get("carry.frag").render({"disparity_map": textures.disparity_map}, self.carrying(viewpoint))
         return textures.disparity
 
     def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: Tone) -> Picture:
@@ -80,7 +80,7 @@ class Synthesized:
         result = textures.after
         if not result.outdated("carried", viewpoint, older, share, tone):
             return result
-        uniforms: dict[str, Uniform] = {**self._carrying(viewpoint), "newest": textures.newest}
+        uniforms: dict[str, Uniform] = {**self.carrying(viewpoint), "newest": textures.newest}
         fade = "fade_none.glsl"
         if older is not None:
             fade = "fade_older.glsl"
@@ -109,7 +109,7 @@ class Synthesized:
             self._passes.get("fade.frag").render({"before": before.texture, "after": after.texture}, {"share": share})
         return result
 
-    def _carrying(self, viewpoint: Point) -> dict[str, Uniform]:
+    def carrying(self, viewpoint: Point) -> dict[str, Uniform]:
         """The uniforms of carry.glsl and the viewpoint."""
         textures = self._textures
         made_at = textures.made_at

@@ -56,6 +56,8 @@ class Textures:
         self.disparity_map = make_texture(context, self.size, 1, "f4")
         self.made_at: Point | None = None  # viewpoint of disparity_map
         self.nearest_disparity = 0.0
+        self.weights = make_texture(context, self.size, 4, "f1")
+        self.weighed = False  # whether these are of the newest synthesis
         self.disparity = make_texture(context, self.size, 1, "f4")
         self.disparity_target = context.framebuffer([self.disparity])
         self.before = Picture(context, self.size, picture_type, self)
