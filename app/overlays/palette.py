@@ -50,9 +50,10 @@ def palette(area: Rect, context: Context) -> None:
         if desk.query != before:
             desk.chosen = 0
         found = matches(desk.query, context)
+        rows = max(min(len(found), _ROWS, int((0.85 * area.height - 5 * em()) // imgui.get_frame_height())), 1)
         moved = _steps()
         desk.chosen = min(max(desk.chosen + moved, 0), max(len(found) - 1, 0))
-        clicked = _list(found, desk.chosen, moved != 0) if found else None
+        clicked = _list(found, rows, desk.chosen, moved != 0) if found else None
         if not found:
             text("No command has these words", theme.TEXT_SOFT)
         run = found[desk.chosen] if entered and found else clicked
@@ -68,12 +69,12 @@ def _steps() -> int:
     return step + _ROWS * (int(pressed(imgui.Key.page_down)) - int(pressed(imgui.Key.page_up)))
 
 
-def _list(found: list[str], chosen: int, moved: bool) -> str | None:
-    """The rows; the name of the command that is clicked."""
+def _list(found: list[str], rows: int, chosen: int, moved: bool) -> str | None:
+    """The list, so many rows high; the name of the command that is clicked."""
     height = imgui.get_frame_height()
     clicked = None
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
-    imgui.begin_child("commands", ImVec2(0, min(len(found), _ROWS) * height))
+    imgui.begin_child("commands", ImVec2(0, rows * height))
     clipper = imgui.ListClipper()
     clipper.begin(len(found), height)
     if moved:
