@@ -14,7 +14,7 @@ from lfcore.key_frames import Stop
 from lfcore.lightfield import LightField
 from lfcore.sweep import PATHS
 from lfcore.sweep_plan import KeyFramePath, Layer, ShapePath, SweepPlan, ViewPath
-from lfcore.sweep_target import Kind, Target
+from lfcore.sweep_target import Kind, Target, check_fits
 
 KEY_FRAMES = "key frames"
 SHAPES = (*PATHS, KEY_FRAMES)
@@ -208,7 +208,7 @@ class ExportChoices:
             return "Give the export a name without slashes."
         if self.product is Product.SWEEP:
             try:
-                self.plan()
+                check_fits(self.plan(), self.format.kind)
             except InputError as error:
                 return str(error)
         return ""

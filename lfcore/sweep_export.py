@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from lfcore.errors import Cancelled, InputError, OutputError
+from lfcore.errors import Cancelled, OutputError
 from lfcore.export import write_disparity, write_image, write_map, write_picture
 from lfcore.frame_files import check_frames_target, write_numbered
 from lfcore.lightfield import FloatArray
 from lfcore.sweep_frames import SweepFrames
 from lfcore.sweep_plan import Layer, SweepPlan
-from lfcore.sweep_target import Kind, Target
+from lfcore.sweep_target import Kind, Target, check_fits
 from lfcore.video import VIDEO_EXTENSIONS, check_video_target, write_video
 
 _T = TypeVar("_T")
@@ -26,6 +26,7 @@ def never() -> bool:
 
 def check_target(plan: SweepPlan, target: Target) -> None:
     """Make sure, before long work, that the sweep can be written there so. Raises OutputError or InputError."""
+    check_fits(plan, target.kind)
     if target.kind is Kind.VIDEO:
         if target.path.suffix.lower() not in VIDEO_EXTENSIONS:
             raise OutputError(
@@ -35,11 +36,6 @@ def check_target(plan: SweepPlan, target: Target) -> None:
         check_video_target(target.path, plan.fps)
         return
     check_frames_target(target.path)
-    if target.kind is Kind.EXR:
-        if plan.layer not in (Layer.IMAGE, Layer.DISPARITY, Layer.ERROR):
-            raise InputError(f"EXR frames hold the numbers of one layer, not {plan.layer.value}; choose PNG frames or a video.")
-        if plan.labels or plan.scale != 1 or plan.brighten:
-            raise InputError("EXR frames hold numbers in their own size; leave out labels, scale and brightening.")
 
 
 def export_sweep(

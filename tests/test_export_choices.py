@@ -59,6 +59,8 @@ def test_a_path_without_key_frames_is_a_fault_that_is_told() -> None:
         choices.plan()
     assert "name" in ExportChoices(name=" ").fault
     assert "name" in ExportChoices(name="a/b").fault
+    assert "leave out labels" in ExportChoices(format=Format.EXR, labels=True).fault
+    assert ExportChoices(format=Format.PNG, labels=True).fault == ""
     assert ExportChoices().fault == ""
 
 

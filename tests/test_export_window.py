@@ -33,6 +33,8 @@ models = {"truth": ModelChoice(TruthSynthesizer, False)}
 show(Path(sys.argv[1]), Engine(TruthSynthesizer, 2**26, name="truth"), "truth", models=models)
 """
 
+SLOW_PROGRAM = PROGRAM.replace("(TruthSynthesizer, False)", "(lambda: TruthSynthesizer(0.3), False)")
+
 
 @pytest.fixture(scope="module")
 def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
@@ -48,11 +50,7 @@ def test_key_frames_are_set_played_saved_and_exported(
     screen: VirtualScreen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    folder = tmp_path / "a scene é"
-    folder.mkdir()
-    for row, views in enumerate(light_field(3, 3, VIEW).views):
-        for column, view in enumerate(views):
-            write_picture(folder / f"view_{row:02}_{column:02}.png", view)
+    folder = views_folder(tmp_path / "a scene é")
     made = {name: tmp_path / f"a scene é sweep{name}" for name in (".mp4", ".json")}
     with screen.program(PROGRAM, str(folder)) as program:
         wait_until(lambda: screen.pixels().max() > 100, "the window")
@@ -95,6 +93,33 @@ def test_key_frames_are_set_played_saved_and_exported(
     frames = SweepFrames(plan, opened, remembering(opened, TruthSynthesizer()))
     export_sweep(frames, Target(tmp_path / "library.mp4", Kind.VIDEO))
     assert (tmp_path / "library.mp4").read_bytes() == made[".mp4"].read_bytes()
+
+
+def test_an_export_that_is_not_finished_at_the_end_leaves_nothing(
+    screen: VirtualScreen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    place = tmp_path / "place"
+    folder = views_folder(place / "scene")
+    with screen.program(SLOW_PROGRAM, str(folder)) as program:
+        wait_until(lambda: screen.pixels().max() > 100, "the window")
+
+        def begun() -> bool:
+            screen.xdotool("key", "ctrl+shift+e")
+            return any(place.glob(".scene sweep*"))  # the temporary file
+
+        wait_until(begun, "the export to begin")
+        screen.xdotool("key", "ctrl+q")
+        assert program.wait(60) == 0
+    assert list(place.iterdir()) == [folder]
+
+
+def views_folder(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    for row, views in enumerate(light_field(3, 3, VIEW).views):
+        for column, view in enumerate(views):
+            write_picture(folder / f"view_{row:02}_{column:02}.png", view)
+    return folder
 
 
 def read(path: Path) -> np.ndarray:
