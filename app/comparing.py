@@ -14,7 +14,7 @@ from app.comparison import Comparison, Difference, Source
 from app.engine import Answer, Engine
 from app.geometry import Point
 from app.readout import ScoreText
-from app.worker import Cancel, Done, LatestWorker
+from app.worker import Done, LatestWorker
 from lfcore.lightfield import FloatArray, LightField
 
 STOP_SECONDS = 5.0
@@ -28,11 +28,9 @@ class _Subject:
     partner: FloatArray  # (H, W, 3)
     difference: Difference | None
 
-    def same_as(self, other: _Subject | None) -> bool:
+    def same_pair(self, other: _Subject | None) -> bool:
         """Whether the other is of the very same arrays."""
-        if other is None or self.difference is not other.difference:
-            return False
-        return self.shown is other.shown and self.partner is other.partner
+        return other is not None and self.shown is other.shown and self.partner is other.partner
 
 
 @dataclass(frozen=True)
@@ -99,10 +97,17 @@ class Comparing:
             self._drop()
             return
         subject = _Subject(picture.synthesis.image, partner, difference)
-        if not subject.same_as(self._subject):
-            self._drop()
-            self._subject = subject
-            self._ticket = self._worker.submit(lambda cancelled: _measured(subject, cancelled))
+        same = subject.same_pair(self._subject)
+        if same and self._subject is not None and subject.difference is self._subject.difference:
+            return
+        score = self.measured.score if same and self.measured is not None else None
+        self._drop()
+        self._subject = subject
+        if score is not None:
+            self.measured = Measured(score, None, None)
+            if difference is None:
+                return
+        self._ticket = self._worker.submit(lambda cancelled: _measured(subject, score))
 
     def news(self) -> list[str]:
         """Take what has been measured since the last call. Returns messages for the person at the screen."""
@@ -151,8 +156,9 @@ class Comparing:
         self.measured = self._subject = None
 
 
-def _measured(subject: _Subject, cancelled: Cancel) -> Measured:
-    score = scoring.score(subject.shown, subject.partner)
+def _measured(subject: _Subject, score: ScoreText | None) -> Measured:
+    """score: of the two, where it is known."""
+    score = score or scoring.score(subject.shown, subject.partner)
     if subject.difference is None:
         return Measured(score, None, None)
     compute = scoring.similarity if subject.difference is Difference.SIMILARITY else scoring.blocks

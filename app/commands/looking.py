@@ -24,7 +24,7 @@ def _next_model(context: Context) -> None:
 COMMANDS: dict[str, Command] = {
     "synthesis": Command(("1",), "The synthesis", LOOKING, look_at(Look.SYNTHESIS)),
     "disparity": Command(("2",), "Its disparity, in colours", LOOKING, look_at(Look.DISPARITY)),
-    "error": Command(("3",), "The error against the captured view", LOOKING, look_at(Look.ERROR)),
+    "error": Command(("3",), "The difference from the captured view, or from another partner", LOOKING, look_at(Look.ERROR)),
     "captured": Command(("C",), "Show the camera's own view where the viewpoint falls on one", LOOKING, toggle("captured")),
     "inspector": Command(("V",), "Values of the pixel under the cursor", LOOKING, toggle("inspector")),
     "model": Command(("M",), "The next model for a hand at rest", LOOKING, _next_model),

@@ -25,7 +25,8 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
     elif readout.step is Step.CAPTURED:
         labels.append(("Captured view", theme.GOOD))
     elif state.look is not Look.SYNTHESIS:
-        labels.append((comparison.own_name(state, readout), theme.TEXT))
+        name = comparison.own_name(state, readout)
+        labels.append((name[0].upper() + name[1:], theme.TEXT))
     if state.look is Look.REFOCUS:
         labels.append((_focus_words(state, readout), theme.TEXT_SOFT))
     if is_extrapolated(state.u, state.v):
@@ -61,7 +62,7 @@ def missing(area: Rect, context: Context, readout: Readout) -> None:
         _no_partner(area, context, readout)
     elif look is Look.ERROR and context.state.comparison.difference.measured and not readout.compared.mapped:
         with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
-            wrapped("The map comes with the finished picture")
+            wrapped("The map is computed when the picture is finished")
     elif look.needs_disparity and not readout.has_disparity:
         with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
             wrapped("No disparity yet")
