@@ -127,7 +127,8 @@ def _grid(options: argparse.Namespace) -> int:
             write_views(out, side, _views(synthesizer), done)
 
     seconds = _timed(write, side**2)
-    print(f"{out}: {side} x {side} views of {light_field.name} by {synthesizer.name}, {seconds:.1f} s")
+    hint = f"; open it with --views {side}" if out.suffix.lower() == ".png" else ""
+    print(f"{out}: {side} x {side} views of {light_field.name} by {synthesizer.name}, {seconds:.1f} s{hint}")
     return 0
 
 
