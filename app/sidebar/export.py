@@ -102,7 +102,11 @@ def _length(choices: ExportChoices) -> None:
 def _focus(choices: ExportChoices) -> None:
     first, last = choices.focus
     limits = (-MAX_FOCUS, MAX_FOCUS)
-    if choices.shape != KEY_FRAMES:
+    if choices.shape == KEY_FRAMES:
+        of_keys = " \N{RIGHTWARDS ARROW} ".join(number(key.focus or 0.0, 1) for key in choices.key_frames)
+        text(elided(f"{of_keys} px", imgui.get_content_region_avail().x), theme.TEXT_FAINT)
+        tooltip("Disparity in focus at the key frames, px from corner to corner")
+    else:
         first = _decimal("From", first, limits, "%.1f", "Disparity in focus where the path begins, px from corner to corner")
         last = _decimal("To", last, limits, "%.1f", "Disparity in focus where the path ends; closed ones go back")
     choices.focus = (first, last)
@@ -190,10 +194,6 @@ def _queue(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     if not readout.exports:
         return
     heading("Exports", fonts)
-    choices = context.state.export
-    if choices.seen_exports < readout.exports[-1].number:  # a new one has come: into sight with it
-        choices.seen_exports = readout.exports[-1].number
-        imgui.set_scroll_y(imgui.get_scroll_max_y() + imgui.get_window_height())
     for status in reversed(readout.exports):
         imgui.push_id(status.number)
         with font(fonts.regular, theme.SMALL):
@@ -203,6 +203,10 @@ def _queue(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
         if imgui.button("Clear", ImVec2(imgui.get_content_region_avail().x, 0)):
             context.requests.append(ExportAction.CLEAR)
         tooltip("Forget those that are over; files stay")
+    choices = context.state.export
+    if choices.seen_exports < readout.exports[-1].number:  # a new one has come: into sight with it
+        choices.seen_exports = readout.exports[-1].number
+        imgui.set_scroll_here_y(1.0)
 
 
 def _job(context: Context, status: Status) -> None:
