@@ -126,7 +126,11 @@ class Samples:
         if look is not Look.LEAN:
             return None
         shares = self.shares(part)
-        return Patch(part, 100 * shares, shares @ np.array(CORNER_COLOURS, np.float32), 0, "% of the inputs")
+        shown = shares
+        if self.weights is not None:
+            shown = (shares / np.maximum(shares.max(2, keepdims=True), 1e-6)) ** np.float32(gain)
+            shown = shown / np.maximum(shown.sum(2, keepdims=True), 1e-6)
+        return Patch(part, 100 * shares, shown @ np.array(CORNER_COLOURS, np.float32), 0, "% of the inputs")
 
     def shares(self, part: Part) -> FloatArray:
         """How much of each warped input is in the picture, (h, w, 4) in the order of CORNERS, sum 1: by weights, or where the

@@ -29,7 +29,7 @@ class Look(Enum):
     WARPED_TOP_RIGHT = "Warped input, top right"
     WARPED_BOTTOM_RIGHT = "Warped input, bottom right"
     ERROR = "Difference"
-    LEAN = "Which input it is most like"
+    LEAN = "Which input it leans on"
     DISAGREEMENT = "Where the warped inputs disagree"
     SWEEP_MEAN = "Plane sweep, mean"
     SWEEP_DEVIATION = "Plane sweep, deviation"
@@ -237,7 +237,7 @@ class ViewState:
 
     def change_contrast(self, factor: float) -> None:
         """More (factor > 1) or less contrast of what is looked at, where it has any."""
-        if self.look is Look.ERROR or self.look.is_deviation:
+        if self.look in (Look.ERROR, Look.LEAN) or self.look.is_deviation:
             self.gain = min(max(self.gain * factor, GAIN_LIMITS[0]), GAIN_LIMITS[1])
         elif self.look is Look.DISPARITY and self.looking.hand_range is not None:
             self.looking = self.looking.with_range_scaled(1 / factor)

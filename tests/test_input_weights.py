@@ -16,7 +16,7 @@ from remote_models import Weigher, make
 from app.canvas import Canvas, Frame
 from app.controller import Controller
 from app.engine import Engine, _pixels
-from app.looking import CORNER_COLOURS
+from app.looking import CORNER_COLOURS, Looking
 from app.samples import Part, Samples
 from app.state import Look
 from lfcore.cache import CacheKey, SynthesisCache
@@ -188,6 +188,13 @@ def test_weights_are_drawn_as_the_mean_of_the_inputs_colours(canvas: Canvas) -> 
     np.testing.assert_allclose(shown, expected, atol=1e-4)
     samples = Samples(light_field(2, 2, SIZE), VIEWPOINT, np.zeros((*SIZE, 3), np.float32), disparity, weights=weights)
     np.testing.assert_allclose(samples.shares(Part(3, 2, 9, 8)) @ np.array(CORNER_COLOURS), expected[2:8, 3:9], atol=1e-5)
+    squared = canvas.read(Frame(Look.LEAN, VIEWPOINT, gain=2.0))
+    squares = weights.astype(float) ** 2
+    expected_squared = np.einsum("khw,kc->hwc", squares, np.array(CORNER_COLOURS)) / np.maximum(squares.sum(0), 1)[..., None]
+    np.testing.assert_allclose(squared, expected_squared, atol=1e-4)
+    patch = samples.patch(Look.LEAN, Part(3, 2, 9, 8), Looking(), 2.0, (0.0, 1.0))
+    assert patch is not None
+    np.testing.assert_allclose(patch.light, expected_squared[2:8, 3:9], atol=1e-5)
     # Half the baseline to the right, what moves by 4 px over the baseline lies 2 px further to the right.
     carried = canvas.read(Frame(Look.LEAN, (VIEWPOINT[0] + 0.5, VIEWPOINT[1])))
     np.testing.assert_allclose(carried[:, 4:], expected[:, 2:-2], atol=1e-4)

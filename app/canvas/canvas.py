@@ -313,7 +313,7 @@ class Canvas:
         if frame.look.corner is not None:
             return makers.inside.warped(frame.look.corner, frame.viewpoint, tone)
         if frame.look is Look.LEAN:
-            return makers.inside.lean(frame.viewpoint, frame.share)
+            return makers.inside.lean(frame.viewpoint, frame.share, frame.gain)
         if frame.look is Look.DISAGREEMENT:
             return makers.inside.disagreement(frame.viewpoint)
         if frame.look is Look.SWEEP_MEAN:

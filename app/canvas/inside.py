@@ -52,18 +52,18 @@ class Inside:
             )
         return result.texture
 
-    def lean(self, viewpoint: Point, share: float) -> moderngl.Texture:
+    def lean(self, viewpoint: Point, share: float, contrast: float) -> moderngl.Texture:
         """Which warped input the picture leans on, in the colours CORNER_COLOURS: by the weights of the newest synthesis, or
-        where it has none by likeness."""
+        where it has none by likeness. contrast: to this power weights are raised."""
         textures = self._textures
         result = textures.inner
-        if not result.outdated("lean", viewpoint, share):
+        if not result.outdated("lean", viewpoint, share, contrast):
             return result.texture
         if textures.weighed:
             result.target.use()
             self._passes.get("lean_weights.frag").render(
                 {"weights": textures.weights, "disparity_map": textures.disparity_map},
-                {**self._synthesized.carrying(viewpoint), "corner_colours": CORNER_COLOURS},
+                {**self._synthesized.carrying(viewpoint), "corner_colours": CORNER_COLOURS, "contrast": contrast},
             )
         else:
             disparity = self._synthesized.carry_disparity(viewpoint)

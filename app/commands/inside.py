@@ -25,7 +25,7 @@ COMMANDS: dict[str, Command] = {
     "top right": Command(("6",), "The top right input, warped", INSIDE, look_at(Look.WARPED_TOP_RIGHT)),
     "bottom left": Command(("7",), "The bottom left input, warped", INSIDE, look_at(Look.WARPED_BOTTOM_LEFT)),
     "bottom right": Command(("8",), "The bottom right input, warped", INSIDE, look_at(Look.WARPED_BOTTOM_RIGHT)),
-    "lean": Command(("9",), "Which warped input the picture is most like, in four colours", INSIDE, look_at(Look.LEAN)),
+    "lean": Command(("9",), "Which warped input the picture leans on, in four colours", INSIDE, look_at(Look.LEAN)),
     "disagreement": Command(("0",), "Where the warped inputs disagree: occlusions", INSIDE, look_at(Look.DISAGREEMENT)),
     "sweep mean": Command(
         ("Shift+9",), "The plane sweep: mean of the inputs at one disparity", INSIDE, look_at(Look.SWEEP_MEAN)

@@ -49,7 +49,7 @@ def inspector(area: Rect, state: ViewState, readout: Readout) -> None:
 
 
 _DETAILS = {
-    Look.LEAN: "Like most",
+    Look.LEAN: "Leans on",
     Look.DISAGREEMENT: "Deviation",
     Look.SWEEP_MEAN: "Mean",
     Look.SWEEP_DEVIATION: "Deviation",

@@ -47,7 +47,7 @@ def legend(area: Rect, state: ViewState, readout: Readout) -> None:
     elif state.look is Look.SWEEP_MEAN:
         _note(area, f"Mean of the inputs {_at_level(state)}")
     elif state.look is Look.LEAN and readout.has_disparity:
-        _lean(area, readout.weighed)
+        _lean(area, state.gain if readout.weighed else None)
 
 
 def _at_level(state: ViewState) -> str:
@@ -93,12 +93,12 @@ def _scale(area: Rect, stops: Stops, rows: list[Row], title: str = "") -> None:
             text(words, theme.TEXT_SOFT)
 
 
-_BY_WEIGHTS = "Colour: how much of each warped input is in the picture, by the weights of the colour network."
+_BY_WEIGHTS = "Colour: how much of each warped input is in the picture, by the weights of the colour network, to the power of"
 _BY_LIKENESS = "Colour: the warped input that the picture is most like here. By likeness: this model tells no weights."
 
 
-def _lean(area: Rect, weighed: bool) -> None:
-    """The inputs' colours, each in its corner, and what decides."""
+def _lean(area: Rect, contrast: float | None) -> None:
+    """The inputs' colours, each in its corner, and what decides: weights to the power of the contrast, or likeness."""
     side = 1.4 * em()
     with card("legend", area, (0.0, 1.0), 22 * em(), PASSIVE):
         brush = imgui.get_window_draw_list()
@@ -109,7 +109,7 @@ def _lean(area: Rect, weighed: bool) -> None:
         imgui.dummy(ImVec2(2 * side, 2 * side))
         imgui.same_line(0, em())
         imgui.begin_group()
-        wrapped(_BY_WEIGHTS if weighed else _BY_LIKENESS, theme.TEXT_SOFT)
+        wrapped(_BY_LIKENESS if contrast is None else f"{_BY_WEIGHTS} {contrast:.1f}.", theme.TEXT_SOFT)
         imgui.end_group()
 
 

@@ -102,15 +102,18 @@ def _of_this_look(context: Context, readout: Readout, fonts: theme.Fonts) -> Non
     elif look is Look.ERROR:
         heading("Error", fonts)
         _gain(context, "The error is shown this many times as bright.  (, and .)")
+    elif look is Look.LEAN and readout.weighed:
+        heading("Weights", fonts)
+        _gain(context, "Weights are raised to this power, so that small differences are seen.  (, and .)", "Contrast")
     elif look is Look.SWEEP_MEAN:
         heading("Plane sweep", fonts)
     if look.is_sweep:
         _level(context)
 
 
-def _gain(context: Context, hint: str) -> None:
+def _gain(context: Context, hint: str, label: str = "Gain") -> None:
     state = context.state
-    state.gain = slider("Gain", state.gain, GAIN_LIMITS, f"× {state.gain:.1f}", hint, _LOGARITHMIC)
+    state.gain = slider(label, state.gain, GAIN_LIMITS, f"× {state.gain:.1f}", hint, _LOGARITHMIC)
 
 
 def _colour_map(context: Context) -> None:
