@@ -11,9 +11,9 @@ from app import theme
 from app.comparison import BLOCK_RANGE, CAPTURED_VIEW, INSTANT, Arrangement, Difference
 from app.geometry import Rect, Size
 from app.panes import Pane, handle
-from app.readout import Readout
+from app.readout import Readout, ScoreText
 from app.state import Look, Step, ViewState
-from app.widgets import FIXED, em, number, packed, tooltip, window
+from app.widgets import FIXED, decibels, em, number, packed, tooltip, window
 from lfcore import colormaps
 
 _STEPS = 32
@@ -42,7 +42,8 @@ def names(panes: tuple[Pane, ...], state: ViewState, readout: Readout) -> None:
 def own_name(state: ViewState, readout: Readout) -> str:
     """What the picture itself is."""
     if state.look is Look.ERROR:
-        return difference_name(state)
+        score = readout.compared.score if readout.compared.there else None
+        return difference_name(state) + (f"   {score_words(score)}" if score is not None else "")
     if state.look is not Look.SYNTHESIS:
         return state.look.value
     if readout.step is Step.CAPTURED:
@@ -52,20 +53,26 @@ def own_name(state: ViewState, readout: Readout) -> str:
 
 def partner_name(state: ViewState, readout: Readout) -> str:
     """What the picture is compared with, and whether that is there."""
-    partner = state.comparison.partner
+    partner, score = state.comparison.partner, readout.compared.score
     if readout.compared.there:
-        return partner
+        return partner if score is None or state.look is Look.ERROR else f"{partner}   {score_words(score)}"
     if partner == CAPTURED_VIEW:
         return "no captured view here"
     return f"{partner}: not yet" if partner != INSTANT else "no disparity yet"
 
 
+def score_words(score: ScoreText) -> str:
+    """How far two pictures are apart, and by which protocol."""
+    return f"{decibels(score.psnr)}, SSIM {number(score.ssim, 4)}, {score.protocol.partition(':')[0]}"
+
+
 def difference_name(state: ViewState) -> str:
     """What the picture of a difference shows."""
     comparison = state.comparison
+    partner = f"the {CAPTURED_VIEW}" if comparison.partner == CAPTURED_VIEW else comparison.partner
     if comparison.difference.measured:
-        return f"{comparison.difference.value} against {comparison.partner}"
-    return f"Difference from {comparison.partner}, {comparison.difference.value}"
+        return f"{comparison.difference.value} against {partner}"
+    return f"difference from {partner}, {comparison.difference.value}"
 
 
 def cross_hairs(panes: tuple[Pane, ...], state: ViewState, picture: Size) -> None:

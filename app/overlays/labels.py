@@ -19,14 +19,13 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
     """Short labels at the top of the picture: what is looked at, and whether it is extrapolated."""
     labels: list[tuple[str, ImVec4]] = []
     if state.flipped:
-        labels.append((comparison.partner_name(state, readout).capitalize(), theme.GOOD))
+        labels.append((_capital(comparison.partner_name(state, readout)), theme.GOOD))
     elif state.comparison.arrangement is not Arrangement.ALONE:
         pass  # each picture has its own name
     elif readout.step is Step.CAPTURED:
         labels.append(("Captured view", theme.GOOD))
     elif state.look is not Look.SYNTHESIS:
-        name = comparison.own_name(state, readout)
-        labels.append((name[0].upper() + name[1:], theme.TEXT))
+        labels.append((_capital(comparison.own_name(state, readout)), theme.TEXT))
     if state.look is Look.REFOCUS:
         labels.append((_focus_words(state, readout), theme.TEXT_SOFT))
     if is_extrapolated(state.u, state.v):
@@ -53,6 +52,10 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
 def _focus_words(state: ViewState, readout: Readout) -> str:
     summed = f", {readout.focus.summed}" if readout.focus.summed else ""
     return f"at {number(state.focusing.focus, 2)} px{summed}"
+
+
+def _capital(words: str) -> str:
+    return words[0].upper() + words[1:]
 
 
 def missing(area: Rect, context: Context, readout: Readout) -> None:

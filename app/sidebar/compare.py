@@ -86,10 +86,8 @@ def _why_no_score(context: Context, readout: Readout) -> str:
 
 def _table(readout: Readout) -> None:
     """PSNR and SSIM of each model against the captured view."""
-    table = readout.compared.table
-    if not table:
-        text("No captured view at this viewpoint", theme.TEXT_FAINT)
-        return
+    hint = "Computed when the hand rests" if readout.compared.table else "No captured view at this viewpoint"
+    table = readout.compared.table or tuple((name, None) for name in readout.models)
     best = max((score.psnr for _, score in table if score is not None), default=None)
     imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 1))
     if imgui.begin_table("models", 3):
@@ -98,15 +96,16 @@ def _table(readout: Readout) -> None:
             imgui.table_next_row()
             imgui.table_next_column()
             text(name, theme.TEXT if name == readout.model else theme.TEXT_SOFT)
-            _cells(score, score is not None and score.psnr == best)
+            _cells(score, score is not None and score.psnr == best, hint)
         imgui.end_table()
     imgui.pop_style_var()
 
 
-def _cells(score: ScoreText | None, best: bool) -> None:
+def _cells(score: ScoreText | None, best: bool, hint: str) -> None:
+    """hint: why there is no score."""
     colour = theme.GOOD if best else theme.TEXT
     imgui.table_next_column()
     text(decibels(score.psnr) if score else DASH, colour)
-    tooltip(score.protocol if score else "Computed when the hand rests")
+    tooltip(score.protocol if score else hint)
     imgui.table_next_column()
     text(number(score.ssim, 4) if score else DASH, colour)
