@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import moderngl
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +15,22 @@ TEXTURE_TYPES = {"uint8": "f1", "uint16": "nu2", "float32": "f4"}  # numpy type 
 
 
 class Picture:
-    """A texture that a pass draws into, and what it was last drawn for."""
+    """A texture that a pass draws into, and what it was last drawn for. Its memory is taken when it is first used: most looks
+    need few of them, and taking all at once would hold up the frame in which a light field appears."""
 
     def __init__(self, context: moderngl.Context, size: Size, dtype: str, owner: Textures, components: int = 4) -> None:
-        self.texture = make_texture(context, size, components, dtype)
-        self.target = context.framebuffer([self.texture])
+        self._context, self._size, self._dtype, self._components = context, size, dtype, components
         self._owner = owner
+
+    @cached_property
+    def texture(self) -> moderngl.Texture:
+        """What is sampled."""
+        return make_texture(self._context, self._size, self._components, self._dtype)
+
+    @cached_property
+    def target(self) -> moderngl.Framebuffer:
+        """What is drawn into."""
+        return self._context.framebuffer([self.texture])
 
     def outdated(self, *made_for: object) -> bool:
         """Whether the picture was last made for something else; it counts as made for this from now on."""
@@ -31,8 +43,9 @@ class Picture:
 
     def release(self) -> None:
         """Give the memory of the graphics back."""
-        self.target.release()
-        self.texture.release()
+        for made in ("target", "texture"):
+            if made in vars(self):
+                vars(self).pop(made).release()
 
 
 class Textures:
