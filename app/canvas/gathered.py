@@ -37,12 +37,12 @@ class Gathered(ABC):
         self.size = size
         self.columns_at, self.rows_at = tuple(columns_at), tuple(rows_at)
         self.positions = np.array([(u, v) for v in rows_at for u in columns_at])  # (N, 2)
-        self.filled = np.zeros(len(self.positions), bool)
+        self.there = np.zeros(len(self.positions), bool)
+        self.usable = np.zeros(len(self.positions), bool)  # there, and not a dark one
         self.version = 0  # grows with every change
         width, height = size[0] * len(columns_at), size[1] * len(rows_at)
         self.texture = context.texture((width, height), 4, alignment=1)
         self.target = context.framebuffer([self.texture])
-        self.target.clear()
         self.order = spread_order(self.positions)
 
     def tile(self, index: int) -> tuple[int, int]:
@@ -75,8 +75,8 @@ class Gathered(ABC):
 
 
 class Captured(Gathered):
-    """The captured views (V, U, H, W, 3), or of a large light field so many rows and columns as have room; `dark` ones are
-    left out."""
+    """The captured views (V, U, H, W, 3), or of a large light field so many rows and columns as have room; `dark` ones, by
+    row and column, are there but not to be used."""
 
     def __init__(
         self,
@@ -94,7 +94,8 @@ class Captured(Gathered):
             context, (width, height), [c / (columns - 1) for c in kept_columns], [r / (rows - 1) for r in kept_rows]
         )
         self._pixels = np.full((height, width, 4), 255, np.uint8)
-        self._waiting = [index for index in self.order if self.kept[index] not in dark]
+        self._dark = dark
+        self._waiting = list(self.order)
 
     @property
     def complete(self) -> bool:
@@ -113,7 +114,8 @@ class Captured(Gathered):
             self._pixels[..., :3] = _in_8_bits(self._views[self.kept[index]])
             self.texture.write(self._pixels, viewport=(*self.tile(index), width, height))
             self._waiting.remove(index)
-            self.filled[index] = True
+            self.there[index] = True
+            self.usable[index] = self.kept[index] not in self._dark
             self.version += 1
 
 
@@ -151,7 +153,7 @@ class Synthesized(Gathered):
             at = (float(self.positions[index][0]), float(self.positions[index][1]))
             draw_elsewhere(self._passes, textures, self.target, self.tile(int(index)), at, Tone())
             self._distance[index] = math.dist(at, made_at)
-            self.filled[index] = True
+            self.there[index] = self.usable[index] = True
             self.version += 1
 
     def redraw(self) -> None:

@@ -87,7 +87,7 @@ class Refocused:
     def picture(self, wanted: Wanted, tone: Tone) -> moderngl.Texture | None:
         """The best picture there is by now, or None where no view is there yet."""
         gathered = self.gathered(wanted.captured)
-        if not gathered.filled.any():
+        if not gathered.usable.any():
             return None
         self._begin(wanted, gathered)
         sums = self._at_hand
@@ -216,7 +216,7 @@ def coarse_views(
 def _weights(wanted: Wanted, gathered: Gathered) -> npt.NDArray[np.float64]:
     """Of each view that is there, by where it lies in the aperture: (N,)."""
     weights = np.zeros(len(gathered.positions))
-    there = np.flatnonzero(gathered.filled)
+    there = np.flatnonzero(gathered.usable)
     weights[there] = aperture_weights(gathered.positions[there], wanted.viewpoint, wanted.aperture, gathered.spacing)
     return weights
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from app.canvas.frame import Target
+from app.canvas.gathered import Gathered
 from app.canvas.passes import AnyTexture, Passes, Uniform
 from app.canvas.placing import visible
 from app.canvas.refocus import Refocused
@@ -40,6 +44,8 @@ class Slices:
         if slicing.captured:
             gathered = self._refocused.gathered(True)
             gathered.fill()
+            if not gathered.there[_needed(slicing, gathered)].all():
+                return True
             more = not gathered.complete
         below, beside = strips.below, strips.beside
         across = Rect(area.x, below.y, area.width, below.height)
@@ -98,14 +104,28 @@ class Slices:
             }
             return {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}, carrying
         gathered = self._refocused.gathered(True)
-        column = min(range(len(gathered.columns_at)), key=lambda i: abs(gathered.columns_at[i] - slicing.viewpoint[0]))
-        row = min(range(len(gathered.rows_at)), key=lambda i: abs(gathered.rows_at[i] - slicing.viewpoint[1]))
+        column, row = _nearest(slicing, gathered)
         tiles: dict[str, Uniform] = {
             "size": gathered.size,
             "grid": (len(gathered.columns_at), len(gathered.rows_at)),
             "held": (column, row),
         }
         return {"views": gathered.texture}, tiles
+
+
+def _needed(slicing: Slicing, gathered: Gathered) -> npt.NDArray[np.bool_]:
+    """Which of the views have a line in one of the slices: (N,)."""
+    column, row = _nearest(slicing, gathered)
+    numbers = np.arange(len(gathered.there))
+    columns = len(gathered.columns_at)
+    return np.asarray((numbers // columns == row) | (numbers % columns == column))
+
+
+def _nearest(slicing: Slicing, gathered: Gathered) -> tuple[int, int]:
+    """Column and row of the views nearest to the viewpoint."""
+    u, v = slicing.viewpoint
+    column = int(np.argmin(np.abs(np.subtract(gathered.columns_at, u))))
+    return column, int(np.argmin(np.abs(np.subtract(gathered.rows_at, v))))
 
 
 def _unbounded(strip: Rect, axis: Point) -> Rect:
