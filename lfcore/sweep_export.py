@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -53,12 +52,12 @@ def export_sweep(
     plan = frames.plan
     check_target(plan, target)
     if target.kind is Kind.VIDEO:
-        pictures = _counted(_ahead(frames.picture(index) for index in range(len(frames))), done, cancelled)
+        pictures = _counted((frames.picture(index) for index in range(len(frames))), done, cancelled)
         write_video(target.path, pictures, plan.fps, plan.plays)
         return
     extension = ".png" if target.kind is Kind.PNG else ".exr"
     makers = (_file_maker(frames, index, target.kind) for index in range(len(frames)))
-    write_numbered(target.path, extension, len(frames), _counted(_ahead(makers), done, cancelled))
+    write_numbered(target.path, extension, len(frames), _counted(makers, done, cancelled))
 
 
 def _file_maker(frames: SweepFrames, index: int, kind: Kind) -> Callable[[Path], None]:
@@ -75,15 +74,6 @@ def _write_numbers(path: Path, numbers: FloatArray, layer: Layer) -> None:
         write_map(path, numbers[..., 0], "mean over the channels of the absolute error against the captured view, 1 = white")
     else:
         write_image(path, numbers)
-
-
-def _ahead(items: Iterator[_T]) -> Iterator[_T]:
-    """The items, each made in another thread while the one before is being used."""
-    with ThreadPoolExecutor(1, "frames") as pool:
-        made = pool.submit(next, items, None)
-        while (item := made.result()) is not None:
-            made = pool.submit(next, items, None)
-            yield item
 
 
 def _counted(items: Iterator[_T], done: Callable[[int], None], cancelled: Callable[[], bool]) -> Iterator[_T]:

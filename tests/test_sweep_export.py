@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -80,21 +79,6 @@ def test_animated_pictures_know_how_often_they_play(tmp_path: Path, plays: int, 
     data = (tmp_path / "a.gif").read_bytes()
     place = data.find(b"NETSCAPE2.0")
     assert (None if place < 0 else struct.unpack_from("<H", data, place + 13)[0]) == gif
-
-
-def test_the_next_frame_is_made_while_one_is_written(tmp_path: Path) -> None:
-    synthesizer = TruthSynthesizer()
-    seen: list[int] = []
-
-    def written(count: int) -> None:
-        deadline = time.monotonic() + 10
-        while len(synthesizer.asked) < min(count + 1, 4) and time.monotonic() < deadline:
-            time.sleep(0.002)
-        seen.append(len(synthesizer.asked))
-
-    frames = SweepFrames(SweepPlan(LINE, 4), light_field(), synthesizer.synthesize)
-    export_sweep(frames, Target(tmp_path / "frames", Kind.PNG), written)
-    assert seen == [2, 3, 4, 4]  # one ahead, and no more
 
 
 TARGETS = [("a.mp4", Kind.VIDEO), ("frames", Kind.PNG), ("deep/er/frames", Kind.EXR)]
