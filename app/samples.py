@@ -23,6 +23,8 @@ from lfcore.lightfield import CORNERS, FloatArray, LightField, as_float
 _LUMINANCE = np.array([0.2989, 0.5870, 0.1140], np.float32)
 _TOE = 0.004
 
+_KEPT = 4  # patches: that of the window, and that under the cursor, of this frame and the last
+
 
 @dataclass(frozen=True)
 class Part:
@@ -95,15 +97,18 @@ class Samples:
 
     def patch(self, look: Look, part: Part, looking: Looking, gain: float, span: tuple[float, float]) -> Patch | None:
         """What the look shows in that part, or None where it has no values here. span: disparities of the first and the
-        last colour. What was asked for last is at hand when it is asked for again."""
+        last colour. The patches that were asked for last are at hand when they are asked for again."""
         if not self.holds(part):
             return None
         wanted = (look, part, looking, gain, span)
-        if wanted not in self._last:
+        if wanted in self._last:
+            found = self._last.pop(wanted)
+        else:
             found = self._patch(look, part, looking, gain, span)
-            self._last.clear()
-            self._last[wanted] = found
-        return self._last[wanted]
+        self._last[wanted] = found  # as the newest
+        if len(self._last) > _KEPT:
+            del self._last[next(iter(self._last))]
+        return found
 
     def _patch(self, look: Look, part: Part, looking: Looking, gain: float, span: tuple[float, float]) -> Patch | None:
         if look is Look.SYNTHESIS:

@@ -111,6 +111,16 @@ def test_what_is_not_there_has_no_values(samples: Samples) -> None:
     assert samples.patch(Look.WARPED_ALL, PARTS[1], LOOKING, GAIN, SPAN) is None
 
 
+def test_what_was_asked_for_last_is_not_computed_again(samples: Samples) -> None:
+    """The window's and the cursor's patches, in turn; the cursor moves on."""
+    window = samples.patch(Look.DISAGREEMENT, PARTS[1], LOOKING, GAIN, SPAN)
+    for x in range(12):
+        samples.patch(Look.DISAGREEMENT, Part(x, 0, x + 1, 1), LOOKING, GAIN, SPAN)
+        assert samples.patch(Look.DISAGREEMENT, PARTS[1], LOOKING, GAIN, SPAN) is window
+    samples.patch(Look.DISAGREEMENT, PARTS[1], LOOKING, 2 * GAIN, SPAN)
+    assert samples.patch(Look.DISAGREEMENT, PARTS[1], LOOKING, 2 * GAIN, SPAN) is not window
+
+
 def test_a_window_full_of_values_takes_no_frame(light_field: LightField, samples: Samples) -> None:
     """As many pixels as fit at 32 window pixels each; the worst of the looks."""
     big = LightField(np.zeros((2, 2, 60, 80, 3), np.uint8), "big", "", "")
