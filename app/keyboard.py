@@ -30,6 +30,7 @@ _KEYS: dict[str, tuple[imgui.Key, ...]] = {
 }
 # Typed with different keys on different keyboards, so they are taken as characters.
 _CHARACTERS = frozenset("?+=-,./[]")
+_SCROLLING = frozenset(("Up", "Down", "PgUp", "PgDn"))  # the page of keys, while it is shown
 _WHILE_TYPING = frozenset(("Esc", "F1"))
 _REPEATING = frozenset(("Left", "Right", "Up", "Down", "PgUp", "PgDn"))
 
@@ -42,7 +43,8 @@ def run_pressed(context: commands.Context) -> None:
     typed = "" if typing else "".join(map(chr, io.input_queue_characters))
     held = _Held(_or_just_released(io.key_ctrl, _CTRL), _or_just_released(io.key_shift, _SHIFT))
     for name, command in commands.COMMANDS.items():
-        if any(_pressed(key, typed, typing, held) for key in command.keys) and not io.key_alt:
+        keys = [key for key in command.keys if not (context.state.help and key in _SCROLLING)]
+        if any(_pressed(key, typed, typing, held) for key in keys) and not io.key_alt:
             commands.run(name, context)
         if command.released is not None and any(imgui.is_key_released(key) for cap in command.keys for key in _KEYS[cap]):
             command.released(context)

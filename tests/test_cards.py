@@ -223,6 +223,27 @@ def test_the_card_of_settings_opens_by_its_key_and_forgets(screen: Screen) -> No
     assert Action.FORGET in screen.requests
 
 
+# The page of keys.
+
+
+def test_the_page_of_keys_scrolls_by_keys_and_the_viewpoint_stays(screen: Screen) -> None:
+    def scroll() -> float:
+        return float(screen.imgui.internal.find_window_by_name("keys").scroll.y)
+
+    screen.size = (800.0, 400.0)
+    screen.press("F1")
+    screen.frame(3)
+    key(screen, "page_down")
+    down = scroll()
+    assert down > 100
+    key(screen, "up_arrow")
+    assert 0 < scroll() < down
+    assert (screen.state.u, screen.state.v) == (0.5, 0.5)
+    screen.press("F1")
+    key(screen, "up_arrow")
+    assert screen.state.v < 0.5
+
+
 # The start picture.
 
 

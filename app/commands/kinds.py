@@ -103,8 +103,9 @@ Run = Callable[[Context], None]
 
 @dataclass(frozen=True)
 class Command:
-    """One thing to do: its keys as on the keyboard's caps (with Ctrl+, Shift+ or Ctrl+Shift+ before them), what it does in
-    words, the group of the F1 page in which it stands, how it is done, and what is done when the key comes up again."""
+    """One thing to do: its keys as on the keyboard's caps (with Ctrl+, Shift+ or Ctrl+Shift+ before them; none: it is found
+    in the palette), what it does in words, the group of the F1 page in which it stands, how it is done, and what is done when
+    the key comes up again."""
 
     keys: tuple[str, ...]
     text: str
@@ -116,7 +117,7 @@ class Command:
     @property
     def tooltip(self) -> str:
         """The words with the keys."""
-        return f"{self.text}  ({' or '.join(self.keys)})"
+        return f"{self.text}  ({' or '.join(self.keys)})" if self.keys else self.text
 
 
 def request(wanted: Request) -> Run:

@@ -47,6 +47,17 @@ def key_page(area: Rect, context: Context, fonts: theme.Fonts) -> None:
         if imgui.button("Done"):
             context.state.help = False
         tooltip("Put this page away  (Esc or F1)")
+        _scroll()
+
+
+def _scroll() -> None:
+    """By the arrow keys, and by pages."""
+    pressed = imgui.is_key_pressed
+    lines = int(pressed(imgui.Key.down_arrow)) - int(pressed(imgui.Key.up_arrow))
+    pages = int(pressed(imgui.Key.page_down)) - int(pressed(imgui.Key.page_up))
+    if lines or pages:
+        room = imgui.get_window_height() - 2 * em()
+        imgui.set_scroll_y(imgui.get_scroll_y() + 2 * lines * em() + pages * room)
 
 
 def _group(name: str, fonts: theme.Fonts, width: float) -> None:
@@ -54,7 +65,7 @@ def _group(name: str, fonts: theme.Fonts, width: float) -> None:
     with font(fonts.bold, theme.SMALL):
         text(name, theme.TEXT_SOFT)
     gestures = [(keys, words) for group, keys, words in GESTURES if group == name]
-    keyed = [(" ".join(c.keys), c.text) for c in COMMANDS.values() if c.group == name]
+    keyed = [(" ".join(c.keys), c.text) for c in COMMANDS.values() if c.group == name and c.keys]
     if imgui.begin_table(name, 2, 0, ImVec2(width, 0)):
         keys_width = min(6.2 * em(), width / 3)
         imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_fixed.value, keys_width)

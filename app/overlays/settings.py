@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app import theme
-from app.commands import Action, Context
+from app.commands import Context
 from app.desk import Card
 from app.geometry import Rect
 from app.readout import Readout
@@ -35,9 +35,7 @@ def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts)
         heading("Remembered", fonts)
         wrapped("Window, panel, these settings, recent files, and how each file was looked at.", theme.TEXT_SOFT)
         imgui.begin_disabled(not readout.shelf.recent)
-        if imgui.button("Forget recent files"):
-            context.requests.append(Action.FORGET)
-        tooltip("Clear the list of recent files, and how they were looked at")
+        button("Forget recent files", "forget", context)
         imgui.end_disabled()
         imgui.same_line()
         if imgui.button("Done"):
