@@ -27,10 +27,11 @@ class _Subject:
     shown: FloatArray  # (H, W, 3)
     partner: FloatArray  # (H, W, 3)
     difference: Difference | None
+    rule: str
 
-    def same_pair(self, other: _Subject | None) -> bool:
-        """Whether the other is of the very same arrays."""
-        return other is not None and self.shown is other.shown and self.partner is other.partner
+    def same_score(self, other: _Subject | None) -> bool:
+        """Whether the other is of the very same arrays, and by the same rule."""
+        return other is not None and (self.shown is other.shown and self.partner is other.partner and self.rule == other.rule)
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,8 @@ class Comparing:
         if picture is None or partner is None:
             self._drop()
             return
-        subject = _Subject(picture.synthesis.image, partner, difference)
-        same = subject.same_pair(self._subject)
+        subject = _Subject(picture.synthesis.image, partner, difference, comparison.rule)
+        same = subject.same_score(self._subject)
         if same and self._subject is not None and subject.difference is self._subject.difference:
             return
         score = self.measured.score if same and self.measured is not None else None
@@ -158,8 +159,9 @@ class Comparing:
 
 def _measured(subject: _Subject, score: ScoreText | None) -> Measured:
     """score: of the two, where it is known."""
-    score = score or scoring.score(subject.shown, subject.partner)
+    score = score or scoring.score(subject.rule, subject.shown, subject.partner)
     if subject.difference is None:
         return Measured(score, None, None)
-    compute = scoring.similarity if subject.difference is Difference.SIMILARITY else scoring.blocks
+    rule = scoring.rule_for(subject.rule, *subject.shown.shape[:2])
+    compute = rule.similarity if subject.difference is Difference.SIMILARITY else rule.blocks
     return Measured(score, subject.difference, compute(subject.shown, subject.partner))

@@ -55,6 +55,7 @@ class Comparison:
     arrangement: Arrangement = Arrangement.ALONE
     wipe: float = 0.5  # where the handle lies, as a fraction of the width of the picture's area
     difference: Difference = Difference.ABSOLUTE
+    rule: str = "K16"  # by which the picture is scored; a name of app.scoring
 
     @property
     def source(self) -> Source:

@@ -29,6 +29,7 @@ from app.readout import Compared, Readout
 from app.samples import Samples
 from app.sampling import Sampler
 from app.scoreboard import Scoreboard
+from app.scoring import DEFAULT_RULE, RULES
 from app.state import CARRIED, Grid, Look, Step, Tab, ViewState, carried_share
 from app.sway import Sway
 from lfcore.cache import rounded
@@ -532,6 +533,13 @@ class Controller:
         state = self.state
         if state.comparison.model is not None and state.comparison.model not in self._models:
             state.comparison = replace(state.comparison, partner=CAPTURED_VIEW)
+        if state.comparison.rule not in RULES:
+            state.comparison = replace(state.comparison, rule=DEFAULT_RULE)
+        if state.comparison.rule != self._engine.rule:
+            self._engine.rule = state.comparison.rule
+            self._count(light_field)
+            if self.picture is not None:
+                self.picture = replace(self.picture, score=self._engine.scores(light_field).get(rounded(*self.viewpoint)))
         self.comparing.follow(light_field, self.viewpoint, state.comparison)
         self.comparing.measure(light_field, self.picture, state.comparison, state.look is Look.ERROR)
 

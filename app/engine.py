@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from app.geometry import Point
 from app.readout import ScoreText
+from app.scoring import DEFAULT_RULE
 from app.scoring import score as scored
 from app.state import Step
 from app.worker import Cancel
@@ -111,7 +112,8 @@ class Engine:
         self._stored_of: tuple[str, str] | None = None  # content of a light field, key of the model for a hand at rest
         self._stored: frozenset[Point] = frozenset()  # viewpoints of these on disk
         self._unsaved: dict[CacheKey, None] = {}  # in the order in which they came
-        self._scores: dict[CacheKey, ScoreText] = {}
+        self.rule = DEFAULT_RULE  # by which views are scored; the main thread may change it
+        self._scores: dict[tuple[CacheKey, str], ScoreText] = {}  # by view and rule
 
     def use(self, name: str, make_synthesizer: MakeSynthesizer, stands_in: bool) -> None:
         """Take another model for a hand at rest; one that was used under this name before is taken up again.
@@ -177,15 +179,16 @@ class Engine:
     def score_by(self, name: str, light_field: LightField, u: float, v: float) -> ScoreText | None:
         """The score of a known model at (u, v), if it has been found."""
         synthesizer = self._models[name].synthesizer
-        return None if synthesizer is None else self._scores.get(cache_key(light_field, synthesizer, u, v))
+        return None if synthesizer is None else self._scores.get((cache_key(light_field, synthesizer, u, v), self.rule))
 
     def scores(self, light_field: LightField) -> dict[Point, ScoreText]:
-        """The scores found for the model for a hand at rest, by viewpoint as caches know it."""
+        """The scores found by the present rule for the model for a hand at rest, by viewpoint as caches know it."""
         synthesizer = self._final.synthesizer
         if synthesizer is None:
             return {}
-        of = (light_field.content_key, synthesizer.key)
-        return {(key.u, key.v): found for key, found in self._scores.copy().items() if (key.content, key.model) == of}
+        of = (light_field.content_key, synthesizer.key, self.rule)
+        known = self._scores.copy().items()
+        return {(key.u, key.v): found for (key, rule), found in known if (key.content, key.model, rule) == of}
 
     def _answered(
         self, model: _Model, light_field: LightField, u: float, v: float, cancelled: Cancel, weighed: bool = False
@@ -215,11 +218,12 @@ class Engine:
         return _answer(synthesis, final=True, kept=False, score=self._keep_score(light_field, key, synthesis))
 
     def _keep_score(self, light_field: LightField, key: CacheKey, synthesis: Synthesis) -> ScoreText | None:
-        found = _score(light_field, synthesis)
+        rule = self.rule
+        found = _score(light_field, synthesis, rule)
         if found is not None:
             if len(self._scores) >= SCORES_KEPT:
                 self._scores.pop(next(iter(self._scores)))
-            self._scores[key] = found
+            self._scores[(key, rule)] = found
         return found
 
     def _cached(self, model: _Model, light_field: LightField, u: float, v: float) -> Answer | None:
@@ -229,7 +233,8 @@ class Engine:
         synthesis = self.cache.get(key)
         if synthesis is None:
             return None
-        return _answer(dataclasses.replace(synthesis, u=u, v=v), final=True, kept=True, score=self._scores.get(key))
+        score = self._scores.get((key, self.rule))
+        return _answer(dataclasses.replace(synthesis, u=u, v=v), final=True, kept=True, score=score)
 
     def cached_positions(self, light_field: LightField) -> tuple[Point, ...]:
         """The viewpoints of this light field that are in memory."""
@@ -336,10 +341,10 @@ def _pixels(image: FloatArray) -> npt.NDArray[np.uint8]:
     return pixels
 
 
-def _score(light_field: LightField, synthesis: Synthesis) -> ScoreText | None:
+def _score(light_field: LightField, synthesis: Synthesis, rule: str) -> ScoreText | None:
     """The score against the captured view at the synthesis's viewpoint, None where there is none."""
     place = light_field.at(synthesis.u, synthesis.v)
-    return None if place is None else scored(synthesis.image, light_field.view(*place))
+    return None if place is None else scored(rule, synthesis.image, light_field.view(*place))
 
 
 def _percentiles(disparity: FloatArray | None) -> tuple[float, ...] | None:

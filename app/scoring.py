@@ -1,66 +1,75 @@
-"""How far two pictures of one viewpoint are apart: scores, and maps of them, by the protocol that suits their size.
-
-A map and its score are of the same pixels: what the protocol leaves out has no value in the map.
-"""
+"""How far two pictures of one viewpoint are apart: scores, and maps of them, by the rule of a scoring protocol."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
+from functools import partial
 
 from app.readout import ScoreText
+from lfcore import score_maps
 from lfcore.lightfield import FloatArray
-from lfcore.metrics import K16_CROP, PSNR_BLOCK, block_psnr, k16, psnr, similarity_map, ssim, to_uint8
+from lfcore.metrics import K16_CROP, SSIM_RADIUS, Score, channel_score, k16, luma_score, psnr, ssim, to_uint8
 
-_SSIM_WINDOW = 11
+Compare = Callable[[FloatArray, FloatArray], FloatArray]
+
+_LEAST_SIDE = 2 * K16_CROP + 2 * SSIM_RADIUS + 1  # px, that the protocols ask for
 
 
 @dataclass(frozen=True)
 class Rule:
-    """The protocol by which pictures are scored, and how many pixels it leaves out on each side."""
+    """A rule of scoring one picture (H, W, 3), 1 = white, against another, and its maps (H, W), nan where it does not look."""
 
-    protocol: str
-    crop: int
-
-
-def rule_for(height: int, width: int) -> Rule:
-    """K16, or the same without its crop where the pictures are too small for that."""
-    if min(height, width) > 2 * K16_CROP + _SSIM_WINDOW:
-        return Rule(f"K16: 8 bits, {K16_CROP} px cropped", K16_CROP)
-    return Rule("8 bits, whole picture", 0)
+    name: str
+    says: str
+    score: Callable[[FloatArray, FloatArray], Score]
+    similarity: Compare
+    blocks: Compare
 
 
-def score(shown: FloatArray, truth: FloatArray) -> ScoreText:
-    """PSNR and SSIM of one picture (H, W, 3) against another, 1 = white."""
-    rule = rule_for(*truth.shape[:2])
-    if rule.crop:
-        found = k16(shown, truth)
-        return ScoreText(found.psnr, found.ssim, rule.protocol)
+def _whole(shown: FloatArray, truth: FloatArray) -> Score:
     a, b = to_uint8(shown), to_uint8(truth)
-    return ScoreText(psnr(a, b), ssim(a, b), rule.protocol)
+    return Score(psnr(a, b), ssim(a, b))
 
 
-def similarity(shown: FloatArray, truth: FloatArray) -> FloatArray:
-    """SSIM around each pixel, float32 (H, W), nan where the protocol does not look."""
-    rule = rule_for(*truth.shape[:2])
-    inside = _inside(rule, truth)
-    values = np.full(truth.shape[:2], np.nan, np.float32)
-    values[inside] = similarity_map(to_uint8(shown)[inside], to_uint8(truth)[inside])
-    return values
+RULES = {
+    rule.name: rule
+    for rule in (
+        Rule("K16", f"RGB in 8 bits, {K16_CROP} px cropped", k16, score_maps.rgb_similarity, score_maps.rgb_blocks),
+        Rule(
+            "7x7-Y",
+            f"luminance Y, {K16_CROP} px cropped",
+            luma_score,
+            score_maps.luma_similarity_map,
+            score_maps.luma_blocks,
+        ),
+        Rule(
+            "8x8-BGR",
+            f"mean of channels in 8 bits, {K16_CROP} px cropped",
+            channel_score,
+            score_maps.channel_similarity,
+            score_maps.channel_blocks,
+        ),
+    )
+}
+DEFAULT_RULE = "K16"
+
+_WHOLE = Rule(
+    "whole picture",
+    "RGB in 8 bits, for views too small to be cropped",
+    _whole,
+    partial(score_maps.rgb_similarity, crop=0),
+    partial(score_maps.rgb_blocks, crop=0),
+)
 
 
-def blocks(shown: FloatArray, truth: FloatArray) -> FloatArray:
-    """PSNR in dB of the block in which each pixel lies, float32 (H, W), nan where the protocol does not look."""
-    rule = rule_for(*truth.shape[:2])
-    inside = _inside(rule, truth)
-    values = np.full(truth.shape[:2], np.nan, np.float32)
-    found = block_psnr(to_uint8(shown)[inside], to_uint8(truth)[inside])
-    height, width = values[inside].shape
-    values[inside] = found.repeat(PSNR_BLOCK, axis=0).repeat(PSNR_BLOCK, axis=1)[:height, :width]
-    return values
+def rule_for(name: str, height: int, width: int) -> Rule:
+    """The named rule, or that of the whole picture where pictures are too small for it."""
+    return RULES[name] if min(height, width) >= _LEAST_SIDE else _WHOLE
 
 
-def _inside(rule: Rule, picture: FloatArray) -> tuple[slice, slice]:
-    height, width = picture.shape[:2]
-    return slice(rule.crop, height - rule.crop), slice(rule.crop, width - rule.crop)
+def score(rule: str, shown: FloatArray, truth: FloatArray) -> ScoreText:
+    """PSNR and SSIM of one picture against another by the named rule."""
+    chosen = rule_for(rule, *truth.shape[:2])
+    found = chosen.score(shown, truth)
+    return ScoreText(found.psnr, found.ssim, f"{chosen.name}: {chosen.says}")

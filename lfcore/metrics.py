@@ -21,11 +21,12 @@ DoubleArray = npt.NDArray[np.float64]
 ByteArray = npt.NDArray[np.uint8]
 
 K16_CROP = 22  # pixels left out on each side, also by the other two protocols
-_SSIM_RADIUS = 5  # 11 taps
+SSIM_RADIUS = 5  # 11 taps
 _FLAT_WINDOW = 7  # pixels
+FLAT_RADIUS = _FLAT_WINDOW // 2
 _SSIM_SIGMA = 1.5
 _SSIM_K1, _SSIM_K2 = 0.01, 0.03
-_SSIM_TAPS = np.exp(-(np.arange(-_SSIM_RADIUS, _SSIM_RADIUS + 1) ** 2) / (2 * _SSIM_SIGMA**2))
+_SSIM_TAPS = np.exp(-(np.arange(-SSIM_RADIUS, SSIM_RADIUS + 1) ** 2) / (2 * _SSIM_SIGMA**2))
 _SSIM_TAPS /= _SSIM_TAPS.sum()
 _BLOCK_ROWS = 64  # a block of the filter's matrix this high has few zeros, and lies in the processor's cache
 PSNR_BLOCK = 16  # pixels
@@ -77,7 +78,11 @@ def block_psnr(a: AnyArray, b: AnyArray) -> FloatArray:
     The peak is that of `psnr`. The last row and column of blocks may hold fewer pixels. Infinite where a block is equal.
     """
     first, second, peak = _as_doubles(a, b)
-    squares = np.square(first - second).mean(axis=2)  # (H, W)
+    return block_psnr_of(np.square(first - second).mean(axis=2), peak)
+
+
+def block_psnr_of(squares: DoubleArray, peak: float) -> FloatArray:
+    """The same from squared differences (H, W)."""
     height, width = squares.shape
     tops, lefts = np.arange(0, height, PSNR_BLOCK), np.arange(0, width, PSNR_BLOCK)
     sums = np.add.reduceat(np.add.reduceat(squares, tops, axis=0), lefts, axis=1)
@@ -110,12 +115,11 @@ def luma_score(synthesized: FloatArray, truth: FloatArray) -> Score:
     the captured view from its 8 bits and rounded to 8 bits, that of the synthesis as it is; the peak is 255 although Y
     spans 219. SSIM is that of one channel with a Gaussian window of 11 x 11, its outermost 5 px left out of the mean.
     """
-    inside = _inside(truth, "7x7-Y", 2 * _SSIM_RADIUS + 1)
-    captured = np.floor(studio_luma(to_uint8(truth) / 255) + 0.5)[inside]
-    found = studio_luma(np.clip(synthesized, 0, 1))[inside]
+    inside = _inside(truth, "7x7-Y", 2 * SSIM_RADIUS + 1)
+    found, captured = (picture[inside] for picture in luma_pair(synthesized, truth))
     mean_square = float(np.mean((captured - found) ** 2))
-    similarity = _similarity(captured, found, 255.0, _gaussian)[_SSIM_RADIUS:-_SSIM_RADIUS, _SSIM_RADIUS:-_SSIM_RADIUS]
-    return Score(math.inf if mean_square == 0 else 10 * math.log10(255**2 / mean_square), float(similarity.mean()))
+    similarity = luma_similarity(found, captured).mean()
+    return Score(math.inf if mean_square == 0 else 10 * math.log10(255**2 / mean_square), float(similarity))
 
 
 def channel_score(synthesized: FloatArray, truth: FloatArray) -> Score:
@@ -129,8 +133,24 @@ def channel_score(synthesized: FloatArray, truth: FloatArray) -> Score:
     pairs = [(a[..., channel], b[..., channel]) for channel in range(3)]
     return Score(
         sum(psnr(found, captured) for found, captured in pairs) / 3,
-        sum(_flat_ssim(found, captured) for found, captured in pairs) / 3,
+        sum(float(flat_similarity(found, captured).mean()) for found, captured in pairs) / 3,
     )
+
+
+def luma_pair(synthesized: FloatArray, truth: FloatArray) -> tuple[DoubleArray, DoubleArray]:
+    """What 7x7-Y compares, before its crop: Y of two float pictures (H, W, 3), that of the captured view in whole steps."""
+    return studio_luma(np.clip(synthesized, 0, 1)), np.floor(studio_luma(to_uint8(truth) / 255) + 0.5)
+
+
+def luma_similarity(found: DoubleArray, captured: DoubleArray) -> DoubleArray:
+    """SSIM of Y around each pixel but the SSIM_RADIUS outermost: (H, W) -> (H - 10, W - 10)."""
+    return _similarity(captured, found, 255.0, _gaussian)[SSIM_RADIUS:-SSIM_RADIUS, SSIM_RADIUS:-SSIM_RADIUS]
+
+
+def flat_similarity(a: ByteArray, b: ByteArray) -> DoubleArray:
+    """SSIM of one channel in the flat window around each pixel but the FLAT_RADIUS outermost: (H, W) -> (H - 6, W - 6)."""
+    count = _FLAT_WINDOW**2
+    return _similarity(a.astype(np.float64), b.astype(np.float64), 255.0, _flat, count / (count - 1))
 
 
 def studio_luma(image: AnyArray) -> DoubleArray:
@@ -178,11 +198,6 @@ def _similarity(
     return similarity
 
 
-def _flat_ssim(a: ByteArray, b: ByteArray) -> float:
-    count = _FLAT_WINDOW**2
-    return float(np.mean(_similarity(a.astype(np.float64), b.astype(np.float64), 255.0, _flat, count / (count - 1))))
-
-
 def _flat(values: DoubleArray) -> DoubleArray:
     """Mean over each window of 7 x 7 that lies within the picture: (H, W) -> (H - 6, W - 6)."""
     windows = np.lib.stride_tricks.sliding_window_view(values, _FLAT_WINDOW, axis=0).mean(-1)
@@ -212,10 +227,10 @@ def _gaussian_along(values: DoubleArray, axis: int) -> DoubleArray:
     filtered = np.empty_like(rows)
     for start in range(0, length, _BLOCK_ROWS):
         stop = min(start + _BLOCK_ROWS, length)
-        low, high = max(start - _SSIM_RADIUS, 0), min(stop + _SSIM_RADIUS, length)
+        low, high = max(start - SSIM_RADIUS, 0), min(stop + SSIM_RADIUS, length)
         places = np.arange(start, stop)
         matrix = np.zeros((stop - start, high - low))
-        for offset, tap in zip(range(-_SSIM_RADIUS, _SSIM_RADIUS + 1), _SSIM_TAPS, strict=True):
+        for offset, tap in zip(range(-SSIM_RADIUS, SSIM_RADIUS + 1), _SSIM_TAPS, strict=True):
             matrix[places - start, np.clip(places + offset, 0, length - 1) - low] += tap
         np.matmul(matrix, rows[low:high], out=filtered[start:stop])
     return np.moveaxis(filtered.reshape(ahead.shape), 0, axis)

@@ -18,7 +18,7 @@ from app.foresight import captured_viewpoints
 from app.state import Look, Step, Tab
 from lfcore.errors import WeightsError
 from lfcore.lightfield import FloatArray
-from lfcore.metrics import k16, similarity_map, to_uint8
+from lfcore.metrics import k16, luma_score, similarity_map, to_uint8
 from lfcore.store import ViewStore
 from lfcore.synthesizer import Synthesis
 
@@ -285,3 +285,24 @@ def test_scoring_stops_at_once_when_the_person_does_something(program: Program) 
     first.seconds = 0.0
     program.state.move_to(0.3, 0.3)
     program.until(lambda: program.controller.step is Step.FULL)
+
+
+def test_another_protocol_scores_everything_anew_without_synthesizing_anything(program: Program) -> None:
+    controller, state = program.controller, program.state
+    state.foresight = True
+    state.tab = Tab.COMPARE
+    program.until(lambda: None not in scores(program))
+    before, asked = scores(program), len(program.models["first"].asked)
+    program.compare(rule="7x7-Y")
+    program.tick()
+    assert set(scores(program)) == {None}
+    assert controller.readout(None).compared.score is None  # rather than that of another protocol
+    program.until(lambda: None not in scores(program) and controller.readout(None).compared.score is not None)
+    score = controller.readout(None).compared.score
+    expected = luma_score(image_of(program), light_field().view(1, 1))
+    assert score is not None and "7x7-Y" in score.protocol
+    assert (score.psnr, score.ssim) == pytest.approx((expected.psnr, expected.ssim), abs=2e-3)  # of the picture in memory
+    assert len(program.models["first"].asked) == asked
+    program.compare(rule="a rule of long ago")
+    program.tick()
+    assert scores(program) == before  # K16 again, and kept

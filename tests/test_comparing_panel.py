@@ -6,14 +6,16 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from moving_scene import light_field
 from test_panels import GRID, OPEN, Screen
 
 from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement, Difference
 from app.keyboard import _KEYS
 from app.panes import arrange, handle
 from app.readout import Compared, ScoreText
-from app.sidebar.score_map import Summary, summary
+from app.sidebar.score_map import Summary, is_novel, summary
 from app.state import Grid, Look, Tab
+from lfcore.protocols import novel_views
 
 SIZE = (541, 376)
 THERE = replace(OPEN, captured_here=9, models=("full", "realtime", "mean"), compared=Compared(there=True))
@@ -190,6 +192,13 @@ def test_the_summary_leaves_out_inputs_and_dark_views() -> None:
         scores[index] = ScoreText(psnr, 0.9, "K16")
     scores[7] = None
     assert summary(grid, tuple(scores)) == Summary(4, 3, 33.0, 30.0, 35.0)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(7, 7), (8, 8), (3, 5), (2, 2)])
+def test_the_summary_is_of_the_views_that_the_protocols_score(rows: int, columns: int) -> None:
+    """So that on 7 x 7 and 8 x 8 views its mean is the protocol's."""
+    expected = {row * columns + column for row, column in novel_views(light_field(rows, columns, (4, 4)))}
+    assert {index for index in range(rows * columns) if is_novel(Grid(rows, columns, 4, 4), index)} == expected
 
 
 @pytest.mark.parametrize("size", [(200, 150), (640, 400), (1280, 800), (5000, 3000)])

@@ -10,9 +10,10 @@ from app import theme
 from app.commands import Context
 from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement, Difference, partners
 from app.readout import Readout, ScoreText
+from app.scoring import RULES
 from app.sidebar import score_map
 from app.state import GAIN_LIMITS, Look, Step
-from app.widgets import DASH, choice, decibels, em, font, heading, number, slider, text, tile, tooltip
+from app.widgets import DASH, choice, decibels, em, heading, number, slider, text, tile, tooltip
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -21,7 +22,7 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     _partner(context, readout)
     _arrangement(context)
     _difference(context)
-    _score(context, readout, fonts)
+    _score(context, readout)
     heading("Models at this view", fonts)
     _table(readout)
     heading("All captured views", fonts)
@@ -66,13 +67,19 @@ def _difference(context: Context) -> None:
     imgui.end_disabled()
 
 
-def _score(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
-    """Of the two pictures that are compared."""
-    score = readout.compared.score
-    text(f"{decibels(score.psnr)}    SSIM {number(score.ssim, 4)}" if score else f"PSNR {DASH}    SSIM {DASH}")
-    tooltip("The picture on screen against its partner, from the very values that are shown")
-    with font(fonts.regular, theme.SMALL):
-        text(score.protocol if score else _why_no_score(context, readout), theme.TEXT_FAINT)
+def _score(context: Context, readout: Readout) -> None:
+    """Of the two pictures that are compared, and by which protocol all scores of the tab are."""
+    comparison, score = context.state.comparison, readout.compared.score
+    hint = f"{RULES[comparison.rule].says}. " if comparison.rule in RULES else ""
+    hint += "On a grid of 7 × 7 views the mean of all novel ones is the score of 7x7-Y, on one of 8 × 8 that of 8x8-BGR."
+    chosen = choice("Protocol", comparison.rule, list(RULES), hint)
+    if chosen != comparison.rule:
+        context.state.comparison = replace(comparison, rule=chosen)
+    if score is None:
+        text(_why_no_score(context, readout), theme.TEXT_FAINT)
+        return
+    text(f"{decibels(score.psnr)}    SSIM {number(score.ssim, 4)}")
+    tooltip(f"The picture on screen against its partner, from the very values that are shown. {score.protocol}")
 
 
 def _why_no_score(context: Context, readout: Readout) -> str:
