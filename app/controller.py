@@ -21,6 +21,7 @@ from app.desk import Card, Folder
 from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.exports import Exports, take_plan
+from app.eyes import Eyes
 from app.focusing import FocusFacts, captured_serve, captured_sliced, carried_disparity, focus_limits
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
@@ -82,6 +83,7 @@ class Controller:
         self.comparing = Comparing(engine, wake)
         self._scoreboard = Scoreboard(engine, self._models)
         self.exports = Exports(self._models, wake, self._hand_waits)
+        self.eyes = Eyes(engine)
         self._grid: Grid | None = None
         self._next: Answer | None = None  # has come while the one before is still being faded in
         self._span: tuple[float, float] | None = None  # least and greatest disparity of the scene, by the first map
@@ -179,6 +181,7 @@ class Controller:
             self._accept(answer)
         self._compare(self.light_field)
         self._compare(self.light_field)
+        self.eyes.look_up(self.light_field, self.state, self._cached)
         if not self.previewing:
             useless = self._resting and self._newest_disparity  # what was asked for elsewhere, to be carried here
             self._asking.ask(self.light_field, self._wanted(self.light_field), useless)
@@ -348,6 +351,7 @@ class Controller:
         choice = self._models[name]
         self._model = name
         self._engine.use(name, choice.make, choice.stands_in)
+        self.eyes.forget()
         self._asking.forget()
         self._next = None
         self._faulted = False
@@ -411,6 +415,7 @@ class Controller:
         self.newest = self.picture = self._next = None
         self._asking.forget()
         self.comparing.forget()
+        self.eyes.forget()
         self._span = None
         self.state.pick = self.state.sliced = None
         self._shown = None
@@ -577,6 +582,9 @@ class Controller:
         stored = engine.stored_position(light_field)
         if stored is not None:
             return Wish(Task.FETCH, stored)
+        eye = self.eyes.missing(self.state, self._cached)
+        if eye is not None and not self.exports.busy and engine.has_room(light_field):
+            return Wish(Task.AHEAD, eye)
         if not self._quiet or self._grid is None or self.exports.busy:
             return None
         missing = self._scoreboard.missing_model(light_field, self.viewpoint) if self._wants_table else None

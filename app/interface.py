@@ -247,6 +247,7 @@ class Interface:
             if answer.final and synthesis.model != self._model:
                 self._model = synthesis.model
                 canvas.redraw_between()
+        canvas.set_eyes({eye: answer.pixels for eye, answer in controller.eyes.answers.items()})
         captured = controller.captured_here
         if captured is not None and captured != self._captured:
             canvas.set_captured(light_field.views[divmod(captured, light_field.columns)])

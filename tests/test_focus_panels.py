@@ -233,3 +233,28 @@ def test_a_path_with_a_focus_drives_the_focus(controller: Controller) -> None:
     assert controller.state.focusing.aperture == 0.7
     expected = [(0.2 + 0.6 * k / 8, -3.0 + 8.0 * k / 8) for k in range(9)]
     assert np.array(seen) == pytest.approx(np.array(expected), abs=0.02)
+
+
+def test_what_the_eyes_see_is_synthesized_while_the_hand_rests(controller: Controller) -> None:
+    controller.show_light_field(light_field())
+    state = controller.state
+    state.foresight = False
+    state.look = Look.STEREO_PARALLEL
+    deadline = time.monotonic() + 60
+    while len(controller.eyes.answers) < 2:
+        controller.tick(time.monotonic())
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    eyes = state.focusing.eyes((state.u, state.v))
+    assert [(a.synthesis.u, a.synthesis.v) for a in controller.eyes.answers.values()] == [pytest.approx(eye) for eye in eyes]
+    kept = dict(controller.eyes.answers)
+    controller.tick(time.monotonic())
+    assert all(controller.eyes.answers[eye] is answer for eye, answer in kept.items())
+    # Beyond what can be synthesized nothing is asked for.
+    state.focusing = replace(state.focusing, baseline=1.0)
+    state.move_to(-0.2, 0.5)
+    controller.tick(time.monotonic())
+    assert controller.eyes.missing(state, ()) == pytest.approx((0.3, 0.5))
+    state.look = Look.SYNTHESIS
+    controller.tick(time.monotonic())
+    assert controller.eyes.answers == {}

@@ -150,3 +150,31 @@ def test_slices_of_carried_views_are_the_truth_in_between(canvas: Canvas) -> Non
         for found, expected in ((below[k], line), (beside[:, k], column)):
             between = (found[0::2] + found[1::2]) / 2  # the mean of a pixel's two window pixels is nearly its centre
             np.testing.assert_allclose(between[9:-9], expected[9:-9], atol=0.01)
+
+
+def test_syntheses_for_the_eyes_take_the_place_of_carried_ones(canvas: Canvas) -> None:
+    focusing = Focusing(baseline=0.4, convergence=1.0)  # shifts by whole and broken pixels: 0.2 px
+    eyes = focusing.eyes(HERE)
+    carried = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing))
+    assert np.abs(carried - 0.5).max() > 0.2
+    grey = _pixels(np.full((*SIZE, 3), 0.5, np.float32))
+    canvas.set_eyes({eyes[1]: grey})
+    pair = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing))
+    np.testing.assert_array_equal(pair[:, :WIDTH], carried[:, :WIDTH])
+    np.testing.assert_allclose(pair[:, WIDTH:], 0.5, atol=0.003)
+    canvas.set_eyes({eyes[0]: grey, eyes[1]: grey})
+    crossed = canvas.read(Frame(Look.STEREO_CROSSED, HERE, focusing=focusing))
+    np.testing.assert_allclose(crossed, 0.5, atol=0.003)
+    # They are for those viewpoints only, and another model's answers may come instead.
+    elsewhere = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=replace(focusing, baseline=0.5)))
+    assert np.abs(elsewhere - 0.5).max() > 0.2
+    canvas.set_eyes({})
+    np.testing.assert_array_equal(canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing)), carried)
+
+
+def test_a_synthesis_for_an_eye_is_moved_by_the_convergence(canvas: Canvas) -> None:
+    focusing = Focusing(baseline=0.4, convergence=DISPARITY)
+    canvas.set_eyes({eye: _pixels(truth(*eye)) for eye in focusing.eyes(HERE)})
+    pair = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing))
+    for half in (pair[:, :WIDTH], pair[:, WIDTH:]):
+        np.testing.assert_allclose(half[INSIDE], truth(*HERE)[INSIDE], atol=0.006)

@@ -7,7 +7,7 @@ light field's own size in 8 bits, as the screen has, and only when it has change
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -176,6 +176,10 @@ class Canvas:
         They are handed to the graphics when they are first needed, a few in each frame.
         """
         self._at_hand.refocused.set_views(views, dark)
+
+    def set_eyes(self, eyes: Mapping[Point, _Bytes]) -> None:
+        """Take the syntheses (H, W, 4) for the viewpoints of a stereo pair's eyes, as far as they are there."""
+        self._at_hand.stereo.set_eyes(eyes)
 
     def redraw_between(self) -> None:
         """Draw the views in between that refocusing sums up anew, from what is now at hand: another model has come."""
