@@ -126,6 +126,18 @@ def test_a_light_field_is_nothing_to_choose_from(tmp_path: Path) -> None:
     assert members(nothing) == ()
 
 
+def test_pictures_saved_beside_light_fields_hide_none_of_them(tmp_path: Path) -> None:
+    scenes = [save_views(tmp_path / name, random_views(2, 2), plain) for name in ("a", "b")]
+    saved = []
+    for u in ("0.50", "0.25", "0.75", "1.00"):
+        saved.append(save(tmp_path / f"a synthesis u{u} v0.50.png", random_views(1, 1)[0, 0]))
+        assert set(members(tmp_path)) == {*scenes, *saved}
+    whole = save_views(tmp_path / "whole", random_views(2, 2), plain)
+    for name in ("depth", "masks"):
+        save_views(whole / name, random_views(2, 2), plain)
+    assert members(whole) == ()
+
+
 def test_pictures_of_different_names_are_a_light_field_each(tmp_path: Path) -> None:
     pixels = random_views(1, 1, 14 * 20, 14 * 20)[0, 0]
     for name in ("IMG_1.png", "IMG_2.png", "IMG_3.png"):

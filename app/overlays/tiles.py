@@ -25,7 +25,8 @@ def tile(path: Path, thumbnail: Thumbnail, chosen: bool) -> bool:
     corner, (width, height) = imgui.get_cursor_screen_pos(), size()
     clicked = bool(imgui.invisible_button(f"tile {path}", ImVec2(width, height)))
     hovered = imgui.is_item_hovered()
-    tooltip(f"{path}\n{thumbnail.reason or thumbnail.caption}".strip())
+    said = thumbnail.reason or thumbnail.caption
+    tooltip(said if said.startswith(str(path)) else f"{path}\n{said}".strip())
     brush = imgui.get_window_draw_list()
     if chosen or hovered:
         fill = theme.ACCENT_DEEP if chosen else theme.FIELD_HOVERED
@@ -37,7 +38,7 @@ def tile(path: Path, thumbnail: Thumbnail, chosen: bool) -> bool:
     y = frame.y + frame.height + 0.4 * em()
     name = elided(path.name or str(path), frame.width)
     brush.add_text(ImVec2(frame.x, y), packed(theme.TEXT_FAINT if dead else theme.TEXT), name)
-    said = elided(_without_path(thumbnail.reason, path) if dead else thumbnail.caption, frame.width)
+    said = _beginning(_without_path(thumbnail.reason, path), frame.width) if dead else elided(thumbnail.caption, frame.width)
     brush.add_text(ImVec2(frame.x, y + 1.35 * em()), packed(theme.TEXT_FAINT if dead else theme.TEXT_SOFT), said)
     return clicked
 
@@ -58,6 +59,15 @@ def _picture(frame: Rect, thumbnail: Thumbnail) -> None:
     x, y = round(frame.x + (frame.width - width) / 2), round(frame.y + (frame.height - height) / 2)
     texture = imgui.ImTextureRef(placed.texture)
     brush.add_image(texture, ImVec2(x, y), ImVec2(x + width, y + height), ImVec2(*placed.first), ImVec2(*placed.last))
+
+
+def _beginning(words: str, width: float) -> str:
+    """As many of the words as there is room for."""
+    kept = words.split()
+    while len(kept) > 1 and imgui.calc_text_size(" ".join(kept) + " …").x > width:
+        kept.pop()
+    shown = " ".join(kept)
+    return elided(shown if len(shown) == len(words) else f"{shown} …", width)
 
 
 def _without_path(reason: str, path: Path) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from lfcore.errors import InputError
 from lfcore.formats import eslf
 from lfcore.formats.images import EXTENSIONS, read_header
-from lfcore.formats.names import belongs_to_grid
+from lfcore.formats.names import belongs_to_grid, find_grid
 
 MEMBERS_LIMIT = 5000
 CONTAINERS = (".lfp", ".lfr", ".lfx")
@@ -45,9 +45,9 @@ def members(folder: Path) -> tuple[Path, ...]:
     folders = [Path(entry.path) for entry in found if entry.is_dir()]
     pictures = [file for file in files if file.suffix.lower() in EXTENSIONS]
     containers = [file for file in files if file.suffix.lower() in CONTAINERS]
-    if pictures and _is_light_field(pictures, bool(containers)):
-        return ()
     inner = [each for each in folders if holds_something(each)]
+    if pictures and _is_light_field(folder, pictures, bool(containers), len(inner)):
+        return ()
     if not containers and not pictures and len(inner) == 1 and _holds(inner[0], EXTENSIONS):
         return ()  # a light field whose views lie one folder deeper
     chosen = {*containers, *pictures, *inner}
@@ -60,11 +60,24 @@ def holds_something(folder: Path) -> bool:
     return _holds(folder, endings) or any(_holds(inner, endings) for inner in _folders(folder))
 
 
-def _is_light_field(pictures: list[Path], among_containers: bool) -> bool:
-    """Whether these pictures are the views of one light field, and not one light field each."""
-    if len(pictures) == 1:
-        return not among_containers and not _is_eslf(pictures[0])
-    return not _is_eslf(pictures[0]) and any(belongs_to_grid(picture, pictures) for picture in _one_of_each(pictures))
+def _is_light_field(folder: Path, pictures: list[Path], among_containers: bool, inner: int) -> bool:
+    """Whether these pictures, beside so many folders with some, are the views of one light field, and not one each.
+
+    Views may be missing where nothing else tells that the folder is something to choose from: opening it then says which.
+    """
+    if _is_eslf(pictures[0]):
+        return False
+    if inner > 1 or (len(pictures) == 1 and (among_containers or inner)):
+        return _is_whole_grid(folder, pictures)
+    return len(pictures) == 1 or any(belongs_to_grid(picture, pictures) for picture in _one_of_each(pictures))
+
+
+def _is_whole_grid(folder: Path, pictures: list[Path]) -> bool:
+    try:
+        find_grid(folder, pictures)
+    except InputError:
+        return False
+    return True
 
 
 def _one_of_each(pictures: list[Path]) -> list[Path]:
