@@ -164,6 +164,8 @@ class Controller:
             self._change_model(self.state.model)
         self._collect()
         self.exports.follow_dialog(self.state.export)
+        for fault in self.exports.faults():
+            self.say(fault)
         if self.light_field is None:
             return
         self._play(now)
@@ -291,6 +293,7 @@ class Controller:
             captions=tuple(each.caption for each in exhibition.exhibits) if exhibition else (),
             value_under_cursor=self._value_under_cursor(),
             exports=self.exports.statuses,
+            exporting=self.exports.words(self._now),
             cached=tuple(self._cached),
             cache_bytes=self._engine.cache.bytes_used,
             cache_limit=self._engine.cache.limit_bytes,
@@ -411,6 +414,8 @@ class Controller:
         self.light_field = light_field
         self.exhibition = opened if isinstance(opened, Exhibition) else None
         self.state.exhibit = self.exhibition.first if self.exhibition is not None else 0
+        if opened is not None:
+            self.state.export.suggest(opened.source, opened.name)
         self.previewing = False
         self.newest = self.picture = self._next = None
         self._asking.forget()
@@ -430,7 +435,6 @@ class Controller:
         if light_field is not None:
             size = (light_field.rows, light_field.columns, light_field.width, light_field.height)
             self._grid = Grid(*size, light_field.dark)
-            self.state.export.suggest(light_field)
             self._count(light_field)
         else:
             self._scoreboard.refresh(None, None)

@@ -11,7 +11,6 @@ from pathlib import Path
 from assets import sample_path
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
-from lfcore.lightfield import LightField
 from lfcore.sweep import PATHS
 from lfcore.sweep_plan import KeyFramePath, Layer, ShapePath, SweepPlan, ViewPath
 from lfcore.sweep_target import Kind, Target, check_fits
@@ -77,6 +76,7 @@ class ExportChoices:
     labels: bool = False
     scale: float = 1.0
     brighten: bool = False
+    gain: float = 8.0
     format: Format = Format.MP4
     plays: int = 0
     side: int = 9
@@ -108,8 +108,9 @@ class ExportChoices:
             self.labels,
             self.scale,
             self.brighten,
-            aperture=self.aperture,
-            plays=self.plays,
+            self.gain,
+            self.aperture,
+            self.plays,
         )
 
     def take(self, plan: SweepPlan) -> None:
@@ -124,7 +125,8 @@ class ExportChoices:
             self.refocus = path.key_frames[0].focus is not None
             self.key_frames = tuple(Stop(key.u, key.v, key.focus or 0.0) for key in path.key_frames)
         self.frames, self.fps, self.layer, self.labels = plan.frames, plan.fps, plan.layer, plan.labels
-        self.scale, self.brighten, self.aperture, self.plays = plan.scale, plan.brighten, plan.aperture, plan.plays
+        self.scale, self.brighten, self.gain = plan.scale, plan.brighten, plan.gain
+        self.aperture, self.plays = plan.aperture, plan.plays
         self.playing = False
 
     # Key frames.
@@ -180,12 +182,12 @@ class ExportChoices:
 
     # Where it goes.
 
-    def suggest(self, light_field: LightField) -> None:
-        """A place for exports of this light field: beside it, or at home where nothing should be written there."""
-        source = Path(light_field.source).absolute()
+    def suggest(self, opened: str, name: str) -> None:
+        """A place for exports of what was opened there: beside it, or at home where nothing should be written there."""
+        source = Path(opened).absolute()
         beside = os.access(source.parent, os.W_OK) and source != sample_path()
         self.folder = str(source.parent if beside else Path.home())
-        self.name = f"{light_field.name} sweep"
+        self.name = f"{name} sweep"
         self.playing = False
 
     @property

@@ -51,7 +51,8 @@ class Phase(Enum):
 
 @dataclass(frozen=True)
 class Status:
-    """How far a job is. `number` names it; `seconds`: since it began, or what it took; `message`: why it failed."""
+    """How far a job is. `number` names it; `seconds`: since it began, or what it took; `message`: why it failed;
+    `ended`: when it was over."""
 
     number: int
     title: str
@@ -61,6 +62,7 @@ class Status:
     done: int = 0
     seconds: float = 0.0
     message: str = ""
+    ended: float = 0.0  # monotonic seconds
 
     @property
     def rate(self) -> float | None:
@@ -185,7 +187,7 @@ class ExportQueue:
         """The lock is held by the caller."""
         del self._jobs[number]
         self._cancelled.discard(number)
-        self._change(number, phase=phase, message=message)
+        self._change(number, phase=phase, message=message, ended=time.monotonic())
 
     def _forget_oldest(self) -> None:
         over = [number for number, status in self._statuses.items() if status.phase.over]

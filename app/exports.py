@@ -14,13 +14,16 @@ from app import dialogs
 from app.engine import ModelChoice
 from app.export_choices import ExportChoices
 from app.export_requests import CancelExport, ExportAction, ExportRequest
-from app.exporting import ExportQueue, Status
+from app.exporting import ExportQueue, Phase, Status
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
 from lfcore.sweep_plan import load_plan, save_plan
 
 if TYPE_CHECKING:
     from lfcore.synthesizer import Synthesizer
+
+
+_SHOWN_SECONDS = 6.0
 
 
 class Exports:
@@ -32,6 +35,7 @@ class Exports:
         self._queue = ExportQueue(wake)
         self._wake = wake
         self._hand_waits = hand_waits
+        self._told: set[int] = set()  # exports whose end is known
         self._dialog: dialogs.Dialog | None = None  # for the folder, while it is open
         self._made: dict[str, Synthesizer] = {}  # in the queue's thread; the one used last
 
@@ -44,6 +48,24 @@ class Exports:
     def busy(self) -> bool:
         """Whether something is being exported."""
         return self._queue.busy
+
+    def faults(self) -> list[str]:
+        """Why exports have failed since the last call."""
+        over = {status.number: status for status in self.statuses if status.phase.over}
+        new = [status for number, status in over.items() if number not in self._told]
+        self._told = set(over)
+        return [status.message for status in new if status.phase is Phase.FAILED]
+
+    def words(self, now: float) -> str:
+        """How far the queue is, or, for a while, what has just been written. `now` in seconds, monotonic."""
+        statuses = self.statuses
+        running = next((status for status in statuses if status.phase is Phase.RUNNING), None)
+        if running is not None:
+            return f"exporting {running.target.name}, {running.done} of {running.total}"
+        last = statuses[-1] if statuses else None
+        if last is not None and last.phase is Phase.DONE and now - last.ended < _SHOWN_SECONDS:
+            return f"written: {last.target.name}"
+        return ""
 
     def fulfil(self, request: ExportRequest, choices: ExportChoices, light_field: LightField | None, model: str) -> None:
         """Do what was asked for, but saving a picture. Raises LfviewError where it is impossible as chosen."""

@@ -82,3 +82,4 @@ class Readout:
     cache_hits: int = 0
     shelf: Shelf = field(default_factory=Shelf)  # files to choose from
     exports: tuple[Status, ...] = ()  # in the order in which they came
+    exporting: str = ""  # how far exports are, or what has just been written, in words; empty when there is nothing to say

@@ -92,9 +92,11 @@ def _exhibit(state: ViewState, readout: Readout, x: float, y: float) -> float:
 
 
 def _left_parts(state: ViewState, readout: Readout) -> list[_Part]:
-    if readout.captions:
-        return []
     parts = []
+    if readout.exporting:
+        parts.append(_Part(readout.exporting, "What is being exported, or has just been; see the tab Export  (Ctrl+E)"))
+    if readout.captions:
+        return parts
     if readout.busy:
         parts.append(_Part(readout.busy, "What the synthesis thread is doing now"))
     parts.append(_Part(f"model {readout.model}", "The model that synthesizes when the hand rests"))

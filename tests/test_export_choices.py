@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.export_choices import KEY_FRAMES, ExportChoices, Format, Product, drawn_path
@@ -13,13 +12,12 @@ from app.export_jobs import Source, chosen_job
 from app.exports import plan_file, take_plan
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
-from lfcore.lightfield import LightField
 from lfcore.sweep_plan import KeyFramePath, Layer, ShapePath, SweepPlan, save_plan
 from lfcore.sweep_target import Kind
 from tests.moving_scene import TruthSynthesizer, light_field
 
 PLANS = [
-    SweepPlan(ShapePath("spiral", 0.25), 7, 12, Layer.DISPARITY, True, 0.5, True, aperture=0.5, plays=2),
+    SweepPlan(ShapePath("spiral", 0.25), 7, 12, Layer.DISPARITY, True, 0.5, True, 3.0, 0.5, 2),
     SweepPlan(ShapePath("lawnmower", 0.25, (-1.0, 2.0)), 7),
     SweepPlan(KeyFramePath((Stop(0, 0), Stop(1, 1)), closed=True)),
     SweepPlan(KeyFramePath((Stop(0, 0, -1.5), Stop(1, 1, 2)))),
@@ -113,12 +111,12 @@ def test_formats_know_their_kind() -> None:
 def test_exports_go_home_where_the_folder_is_read_only(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     choices = ExportChoices()
-    choices.suggest(LightField(np.zeros((2, 2, 4, 4, 3), np.uint8), "rock", str(tmp_path / "rock.png"), "test"))
+    choices.suggest(str(tmp_path / "rock.png"), "rock")
     tmp_path.chmod(0o700)
     assert choices.folder == str(Path.home())
 
 
 def test_exports_go_beside_the_light_field(tmp_path: Path) -> None:
     choices = ExportChoices()
-    choices.suggest(LightField(np.zeros((2, 2, 4, 4, 3), np.uint8), "rock", str(tmp_path / "rock.png"), "test"))
+    choices.suggest(str(tmp_path / "rock.png"), "rock")
     assert (choices.folder, choices.name) == (str(tmp_path), "rock sweep")

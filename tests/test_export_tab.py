@@ -150,8 +150,23 @@ def test_an_export_is_made_and_told(controller: Controller, tmp_path: Path) -> N
     assert (told.phase, told.done, told.message) == (Phase.DONE, 4, "")
     assert told.target == tmp_path / "round.mp4"
     assert told.target.stat().st_size > 0
+    assert controller.exports.words(told.ended + 1) == "written: round.mp4"
+    assert controller.exports.words(told.ended + 60) == ""
     with pytest.raises(InputError, match="cannot be used"):
         controller.exports.fulfil(ExportAction.EXPORT, export, controller.light_field, "unknown")
+
+
+def test_an_export_that_fails_is_said_once(controller: Controller, tmp_path: Path) -> None:
+    export = controller.state.export
+    export.folder = str(tmp_path / "gone")
+    controller.exports.fulfil(ExportAction.EXPORT, export, controller.light_field, "truth")
+    wait_until(lambda: not controller.exports.busy, "the export", 60)
+    controller.tick(1.0)
+    assert len(controller.messages) == 1
+    assert "gone" in controller.messages[0]
+    controller.dismiss()
+    controller.tick(2.0)
+    assert controller.messages == []
 
 
 def test_a_saved_path_comes_back_when_it_is_opened(controller: Controller, tmp_path: Path) -> None:

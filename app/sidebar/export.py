@@ -19,7 +19,7 @@ from app.widgets import button, choice, elided, em, font, heading, number, slide
 from lfcore.key_frames import MAX_FOCUS
 from lfcore.quilt import MAX_VIEWS
 from lfcore.sweep import MAX_FRAMES
-from lfcore.sweep_plan import MAX_FPS, MAX_PLAYS, Layer
+from lfcore.sweep_plan import GAIN_LIMITS, MAX_FPS, MAX_PLAYS, Layer
 
 _Chosen = TypeVar("_Chosen", bound=Enum)
 
@@ -119,6 +119,10 @@ def _frames(choices: ExportChoices) -> None:
     layers = {layer: name for name, layer in _LAYERS.items()}
     hint = "What the frames show. Errors are shown at captured views only."
     choices.layer = _LAYERS[choice("Show", layers[choices.layer], tuple(_LAYERS), hint)]
+    if choices.layer is Layer.ERROR:
+        logarithmic = imgui.SliderFlags_.logarithmic.value
+        hint = "The colours end at white divided by this."
+        choices.gain = slider("Gain", choices.gain, GAIN_LIMITS, f"× {choices.gain:.1f}", hint, logarithmic)
     sizes = {f"{100 * choices.scale:.4g} %": choices.scale, **_SIZES}
     shown = next(name for name, scale in sizes.items() if scale == choices.scale)
     choices.scale = sizes[choice("Size", shown, tuple(dict.fromkeys((*_SIZES, shown))), "Of the views' own size")]
