@@ -25,9 +25,10 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     _score(context, readout)
     heading("Models at this view", fonts)
     _table(readout)
-    heading("All captured views", fonts)
     if readout.grid is not None:
-        score_map.draw(context, readout, readout.grid)
+        total = score_map.summary(readout.grid, readout.compared.views)
+        heading(f"All captured views: {total.scored} of {total.views} scored", fonts)
+        score_map.draw(context, readout, readout.grid, total)
 
 
 def _partner(context: Context, readout: Readout) -> None:

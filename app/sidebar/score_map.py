@@ -12,7 +12,7 @@ from app import theme
 from app.commands import Context
 from app.readout import Readout, ScoreText
 from app.state import Grid
-from app.widgets import DASH, decibels, em, number, packed, pairs, text, tile, tooltip
+from app.widgets import DASH, decibels, em, number, packed, pairs, tile, tooltip
 from lfcore import colormaps
 from lfcore.colormaps import ColourMap
 from lfcore.lightfield import CORNERS
@@ -44,15 +44,11 @@ def is_novel(grid: Grid, index: int) -> bool:
     return divmod(index, grid.columns) not in grid.dark and grid.position(index) not in CORNERS
 
 
-def draw(context: Context, readout: Readout, grid: Grid) -> None:
+def draw(context: Context, readout: Readout, grid: Grid, total: Summary) -> None:
     """The grid, and beside it what it comes to."""
-    width = imgui.get_content_region_avail().x
-    scores = readout.compared.views
-    total = summary(grid, scores)
-    _cells(context, readout, grid, total, round(0.46 * width))
+    _cells(context, readout, grid, total, round(0.42 * imgui.get_content_region_avail().x))
     imgui.same_line()
     imgui.begin_group()
-    text(f"{total.scored} of {total.views} scored", theme.TEXT_SOFT)
     rows = [("mean", total.mean), ("least", total.least), ("greatest", total.greatest)]
     pairs("views", [(name, DASH if value is None else decibels(value)) for name, value in rows])
     _bar()
