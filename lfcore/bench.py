@@ -175,7 +175,7 @@ def as_text(measured: dict[str, Any]) -> str:
     if "viewer" in measured:
         viewer = measured["viewer"]
         times = f"{viewer['frame_ms_p50']:.1f} ms a frame, 95 of 100 within {viewer['frame_ms_p95']:.1f} ms"
-        lines.append(f"viewer ({viewer['where']}): {times}")
+        lines.append(f"viewer ({viewer['where']}): {times}; {viewer['views_per_second']:.1f} syntheses a second on screen")
     return "\n".join(lines)
 
 

@@ -93,8 +93,9 @@ def test_the_share_is_that_of_the_networks_in_the_type_computed_in() -> None:
     assert speed.tflops == pytest.approx(0.8) and speed.share_of_ceiling == pytest.approx(0.5)
     assert speed.networks["colour"] == bench.NetworkSpeed(2.0, 1.25)
     text = bench.as_text({**bench.as_json("a machine", bench.Ceiling(3.0, 1.6), {"full": speed}),
-                          "viewer": {"frame_ms_p50": 4.0, "frame_ms_p95": 9.0, "frames": 60, "where": "window"}})  # fmt: skip
+                          "viewer": {"frame_ms_p50": 4.0, "frame_ms_p95": 9.0, "frames": 60, "views_per_second": 5.5,
+                                     "where": "window"}})  # fmt: skip
     assert "full: 2.000 s a view" in text
     assert "disparity 1.000 s, 0.500 TFLOP/s, 31% of the ceiling" in text
     assert "networks together: 0.800 TFLOP/s, 50% of the ceiling" in text
-    assert "95 of 100 within 9.0 ms" in text
+    assert "95 of 100 within 9.0 ms; 5.5 syntheses a second on screen" in text
