@@ -98,13 +98,10 @@ class Samples:
     def patch(self, look: Look, part: Part, looking: Looking, gain: float, span: tuple[float, float]) -> Patch | None:
         """What the look shows in that part, or None where it has no values here. span: disparities of the first and the
         last colour. The patches that were asked for last are at hand when they are asked for again."""
-        if not self.holds(part):
+        if look is not Look.WARPED_ALL and not self.holds(part):
             return None
         wanted = (look, part, looking, gain, span)
-        if wanted in self._last:
-            found = self._last.pop(wanted)
-        else:
-            found = self._patch(look, part, looking, gain, span)
+        found = self._last.pop(wanted) if wanted in self._last else self._patch(look, part, looking, gain, span)
         self._last[wanted] = found  # as the newest
         if len(self._last) > _KEPT:
             del self._last[next(iter(self._last))]
@@ -124,6 +121,8 @@ class Samples:
             return None
         if look is Look.DISPARITY:
             return _of_map(self.disparity[part.slices], span, part, looking, 2, "px over the baseline")
+        if look is Look.WARPED_ALL:
+            return self._of_picture(self._sheet(part), part, looking)
         if look.corner is not None:
             return self._of_picture(self._warped(look.corner, part)[0], part, looking)
         if look is Look.DISAGREEMENT:
@@ -182,6 +181,20 @@ class Samples:
         seen, counts = (np.stack(each) for each in zip(*found, strict=True))
         seen = seen[..., 0]
         return _mean(seen, counts), _deviation(seen, counts)
+
+    def _sheet(self, part: Part) -> FloatArray:
+        """The four warped inputs beside each other, (h, w, 3); the part is one of the sheet."""
+        height, width = self.image.shape[:2]
+        values = np.zeros((part.bottom - part.top, part.right - part.left, 3), np.float32)
+        for corner, (u, v) in enumerate(CORNERS):
+            x, y = int(u) * width, int(v) * height  # where the input lies
+            left, top = max(part.left, x), max(part.top, y)
+            right, bottom = min(part.right, x + width), min(part.bottom, y + height)
+            if left < right and top < bottom:
+                place = Part(left - part.left, top - part.top, right - part.left, bottom - part.top)
+                seen = Part(left - x, top - y, right - x, bottom - y)
+                values[place.slices] = self._warped(corner, seen)[0]
+        return values
 
     def _all_warped(self, part: Part) -> list[tuple[FloatArray, npt.NDArray[np.bool_]]]:
         return [self._warped(corner, part) for corner in range(len(CORNERS))]

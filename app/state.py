@@ -66,6 +66,11 @@ class Look(Enum):
         return self is Look.SWEEP_MEAN or self is Look.SWEEP_DEVIATION
 
     @property
+    def is_toned(self) -> bool:
+        """Whether it is of pictures, which are looked at in a tone."""
+        return not self.is_deviation and self not in (Look.DISPARITY, Look.ERROR, Look.LEAN)
+
+    @property
     def is_deviation(self) -> bool:
         """Whether it is a map of deviations from 0 up, in colours and with a gain."""
         return self is Look.DISAGREEMENT or self is Look.SWEEP_DEVIATION

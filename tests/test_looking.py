@@ -86,7 +86,7 @@ def test_sliders_of_tone_level_and_gain_are_there_for_the_looks_that_have_them(s
     for look in (Look.SWEEP_MEAN, Look.SWEEP_DEVIATION):
         state.look, state.looking = look, Looking()
         screen.frame(2)
-        screen.find_in_panel(lambda: state.looking.level != 0 or state.look is not look, "left")
+        screen.find_in_panel(lambda shown=look: state.looking.level != 0 or state.look is not shown, "left")
         state.look = look
     state.look, gain = Look.DISAGREEMENT, state.gain
     screen.frame(2)
@@ -111,6 +111,18 @@ def test_gain_belongs_to_deviations_as_to_the_error() -> None:
     state.look = Look.SYNTHESIS
     state.change_contrast(0.5)
     assert state.gain == GAIN_LIMITS[1]
+
+
+def test_the_window_says_that_a_picture_is_not_shown_as_stored(screen: Screen) -> None:
+    def drawn() -> int:
+        screen.frame(3)
+        return int(screen.imgui.get_draw_data().total_vtx_count)
+
+    for look, said in ((Look.SYNTHESIS, True), (Look.SWEEP_MEAN, True), (Look.DISPARITY, False), (Look.SWEEP_DEVIATION, False)):
+        screen.state.look, screen.state.looking = look, Looking()
+        before = drawn()
+        screen.state.looking = Looking(Tone(stops=0.5))
+        assert (drawn() - before > 30) is said  # "+0.5 stops"; the slider's value has a digit more
 
 
 def test_ranges_and_levels_stay_within_limits() -> None:

@@ -28,6 +28,9 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
         labels.append((_capital(comparison.own_name(state, readout)), theme.TEXT))
     if state.look is Look.REFOCUS:
         labels.append((_focus_words(state, readout), theme.TEXT_SOFT))
+    tone = state.looking.tone.words()
+    if tone and state.look.is_toned:
+        labels.append((_capital(tone), theme.TEXT_SOFT))
     if is_extrapolated(state.u, state.v):
         labels.append(("Extrapolated", theme.WARNING))
     if state.captured and state.look is Look.SYNTHESIS and readout.captured_here is None:
