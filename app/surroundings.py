@@ -219,7 +219,10 @@ class Surroundings:
             self.controller.state.path_field = True
 
     def _start_folder(self) -> Path:
-        """Where a dialog begins: beside what is open, or was opened last."""
+        """Where a dialog begins: in the folder that is shown, or beside what is open or was opened last."""
+        shown = self.controller.folder
+        if self.controller.state.desk.card is Card.BROWSER and shown is not None and shown.path is not None:
+            return shown.path
         source = self._source()
         return source.parent if source is not None else Path.home()
 

@@ -9,10 +9,14 @@ from typing import Any
 from app.viewer import _Window
 
 
-def test_of_several_things_dropped_the_first_is_opened() -> None:
+def test_one_thing_dropped_is_opened_and_several_are_shown_to_choose_from() -> None:
     opened: list[Path] = []
+    shown: list[list[Path]] = []
     window: Any = object.__new__(_Window)  # no display is asked for
-    window._interface = SimpleNamespace(controller=SimpleNamespace(open=opened.append))
-    window._dropped(None, ["/tmp/a folder", "/tmp/b.png"])
+    controller, surroundings = SimpleNamespace(open=opened.append), SimpleNamespace(choose_among=shown.append)
+    window._interface = SimpleNamespace(controller=controller, surroundings=surroundings)
+    window._dropped(None, ["/tmp/a folder"])
     window._dropped(None, [])
+    window._dropped(None, ["/tmp/a folder", "/tmp/b.png"])
     assert opened == [Path("/tmp/a folder")]
+    assert shown == [[Path("/tmp/a folder"), Path("/tmp/b.png")]]
