@@ -42,7 +42,10 @@ class Score:
 
 def to_uint8(image: FloatArray) -> ByteArray:
     """Float picture with 1 = white to 8 bits: clipped, halves rounded up."""
-    return np.floor(np.clip(image, 0, 1) * np.float32(255) + np.float32(0.5)).astype(np.uint8)
+    values = np.clip(image, 0, 1)
+    values *= np.float32(255)  # in place: a third of the time
+    values += np.float32(0.5)
+    return values.astype(np.uint8)
 
 
 def psnr(a: AnyArray, b: AnyArray) -> float:
