@@ -22,7 +22,7 @@ from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.exports import Exports, take_plan
 from app.eyes import Eyes
-from app.focusing import FocusFacts, captured_serve, captured_sliced, carried_disparity, focus_limits
+from app.focusing import FocusFacts, captured_sliced, captured_summed, carried_disparity, focus_limits
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
@@ -342,7 +342,7 @@ class Controller:
     def _focus_facts(self) -> FocusFacts:
         state = self.state
         under = self._disparity_at(state.sliced) if state.focusing.slices and state.sliced is not None else None
-        return FocusFacts(focus_limits(self._span), self.captured_summed, under=under)
+        return FocusFacts(focus_limits(self._span), under=under)
 
     def _hand_waits(self) -> bool:
         """Whether the person waits for a view, which comes before exports."""
@@ -368,7 +368,7 @@ class Controller:
     def captured_summed(self) -> bool:
         """Whether refocusing sums up captured views, not such as are drawn in between."""
         grid = self._grid
-        return grid is None or captured_serve(self.state.focusing.views, grid.rows, grid.columns, self._span)
+        return grid is None or captured_summed(self.state.focusing.views, grid.rows, grid.columns, self._span)
 
     @property
     def captured_sliced(self) -> bool:

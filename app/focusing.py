@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from app.geometry import Point
 from lfcore.key_frames import MAX_FOCUS
+from lfcore.refocus import captured_serve
 
 APERTURE_LIMITS = (0.0, 1.5)  # diameter in baselines; from 1.42 on it takes in all views, from the middle
 BASELINE_LIMITS = (0.02, 1.0)  # between the eyes, in baselines of the light field
@@ -17,8 +18,6 @@ FOCUS_STEP = 0.25  # px over the baseline, by a key
 BASELINES = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)  # of stereo, by a key
 _APERTURE_FACTOR = 1.25  # by a key
 _LEAST_APERTURE = 0.05  # by a key: below it the aperture is a pinhole
-_GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
-_ENOUGH_VIEWS = 5  # a side, as lfcore.sweep_frames has it
 _ITERATIONS = 4
 SLICE_RANGE = (-0.06, 1.06)  # of u, or v, that a slice shows
 
@@ -74,26 +73,20 @@ class Focusing:
 
 @dataclass(frozen=True)
 class FocusFacts:
-    """What panels print about it. `limits`: least and greatest focus of a slider, px over the baseline. `captured`: whether
-    captured views are summed up, `summed`: how many of which. `under`: the disparity where slices go through."""
+    """What panels print about it. `limits`: least and greatest focus of a slider, px over the baseline. `summed`: how many of
+    which views are summed up. `under`: the disparity where slices go through."""
 
     limits: tuple[float, float] = (-8.0, 8.0)
-    captured: bool = True
     summed: str = ""
     under: float | None = None
 
 
-def captured_serve(choice: Choice, rows: int, columns: int, span: tuple[float, float] | None) -> bool:
+def captured_summed(choice: Choice, rows: int, columns: int, span: tuple[float, float] | None) -> bool:
     """Whether the captured views are those to be summed up. `span`: least and greatest disparity of the scene, px over the
-    baseline, None where no disparity is known, and so nothing can be drawn in between.
-
-    By themselves the captured views are chosen where there are enough of them, and close enough that what is out of focus
-    is smooth.
-    """
-    if choice is not Choice.AUTOMATIC or span is None:
-        return choice is not Choice.SYNTHESIZED or span is None
-    fewest = min(rows, columns)
-    return fewest >= _ENOUGH_VIEWS and (span[1] - span[0]) / (fewest - 1) <= _GHOST
+    baseline, None where no disparity is known, and so nothing can be drawn in between."""
+    if span is None or choice is Choice.CAPTURED:
+        return True
+    return choice is Choice.AUTOMATIC and captured_serve(rows, columns, span)
 
 
 def focus_limits(span: tuple[float, float] | None) -> tuple[float, float]:

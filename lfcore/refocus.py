@@ -10,6 +10,8 @@ import numpy.typing as npt
 from lfcore.lightfield import FloatArray
 
 _CUBIC_A = -0.5  # Keys' cubic, as in lfcore.warp
+_ENOUGH_VIEWS = 5  # a side: fewer than these leave ghosts when they are summed up
+_GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
 
 
 def refocus(
@@ -35,6 +37,13 @@ def refocus(
     if total is None:
         raise ValueError("no view has a weight")
     return total / np.float32(weights)
+
+
+def captured_serve(rows: int, columns: int, span: tuple[float, float]) -> bool:
+    """Whether a light field's captured views do for refocusing: there are enough of them, and they lie so close that what is
+    out of focus is smooth. `span`: least and greatest disparity of the scene, px over the baseline."""
+    fewest = min(rows, columns)
+    return fewest >= _ENOUGH_VIEWS and (span[1] - span[0]) / (fewest - 1) <= _GHOST
 
 
 def aperture_weights(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
@@ -19,7 +20,7 @@ from lfcore.figures import Cell, Legend, figure
 from lfcore.key_frames import Stop
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import absolute_error, to_uint8
-from lfcore.refocus import aperture_weights, refocus
+from lfcore.refocus import aperture_weights, captured_serve, refocus
 from lfcore.sweep_plan import Layer, SweepPlan
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ Synthesize = Callable[[float, float], "Synthesis"]
 MAX_SIDE = 16_383  # px of a frame: the most that a WebP, and about what H.264, can hold
 _CACHE_BYTES = 256 * 2**20  # of past syntheses: a way back meets those of the way there
 _RANGE_STRIDE = 2  # every second row and column tell a range well enough
-_ENOUGH_CAPTURED = 5  # views a side: fewer than these leave ghosts when they are summed
-_GHOST = 3.0  # px: neighbouring views this far apart out of focus are seen singly
 _SUMMED = 9  # synthesized views a side, where the captured ones are too few
 
 
@@ -161,20 +160,22 @@ class SweepFrames:
 
     @cached_property
     def _captured_serve(self) -> bool:
-        """Whether the captured views are summed up: there are enough, so close that what is out of focus is smooth, or there
-        is no disparity by which others could be made."""
+        """Whether the captured views are summed up: they do, or there is no disparity by which others could be made."""
         if self._synthesize(0.5, 0.5).disparity is None:
             return True
-        low, high = self._disparity_range
-        fewest = min(self._light_field.rows, self._light_field.columns)
-        return fewest >= _ENOUGH_CAPTURED and (high - low) / (fewest - 1) <= _GHOST
+        return captured_serve(self._light_field.rows, self._light_field.columns, self._disparity_range)
+
+    @cached_property
+    def _bright(self) -> list[tuple[int, int]]:
+        """(row, column) of the captured views that are not too dark to be used."""
+        rows, columns, dark = self._light_field.rows, self._light_field.columns, self._light_field.dark
+        return [place for place in itertools.product(range(rows), range(columns)) if place not in dark]
 
     @cached_property
     def _summed(self) -> npt.NDArray[np.float64]:
         """(u, v) of the views that refocusing sums up: (N, 2)."""
         if self._captured_serve:
-            rows, columns = self._light_field.rows, self._light_field.columns
-            return np.array([self._light_field.position(r, c) for r in range(rows) for c in range(columns)])
+            return np.array([self._light_field.position(*place) for place in self._bright])
         steps = np.linspace(0, 1, _SUMMED)
         return np.array([(u, v) for v in steps for u in steps])
 
@@ -186,7 +187,7 @@ class SweepFrames:
 
     def _summed_view(self, index: int) -> FloatArray:
         if self._captured_serve:
-            return self._light_field.view(*divmod(index, self._light_field.columns))
+            return self._light_field.view(*self._bright[index])
         u, v = self._summed[index]
         return self._synthesize(float(u), float(v)).image
 

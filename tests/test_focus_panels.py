@@ -25,7 +25,7 @@ from lfcore.sweep_plan import KeyFramePath, SweepPlan
 @pytest.fixture
 def screen(imgui_context: Any) -> Screen:
     made = Screen(imgui_context)
-    made.readout = replace(OPEN, has_disparity=True, focus=FocusFacts((-8.0, 9.0), True, "60 of 64 captured views", -2.0))
+    made.readout = replace(OPEN, has_disparity=True, focus=FocusFacts((-8.0, 9.0), "60 of 64 captured views", -2.0))
     return made
 
 

@@ -14,8 +14,8 @@ from app.focusing import (
     APERTURE_LIMITS,
     Choice,
     Focusing,
-    captured_serve,
     captured_sliced,
+    captured_summed,
     carried_disparity,
     focus_limits,
     place_in_slice,
@@ -56,13 +56,13 @@ def test_the_disparity_of_a_point_is_that_of_the_shader(canvas: Canvas) -> None:
 
 
 def test_captured_views_serve_where_there_are_enough_and_close_enough() -> None:
-    assert captured_serve(Choice.AUTOMATIC, 8, 8, (-4.0, 5.0))
-    assert not captured_serve(Choice.AUTOMATIC, 2, 2, (-4.0, 5.0))
-    assert not captured_serve(Choice.AUTOMATIC, 5, 5, (-14.0, 14.0))  # 7 px from view to view: ghosts
-    assert captured_serve(Choice.AUTOMATIC, 2, 2, None)  # nothing else can be done without any disparity
-    assert captured_serve(Choice.CAPTURED, 2, 2, (-4.0, 5.0))
-    assert not captured_serve(Choice.SYNTHESIZED, 8, 8, (-4.0, 5.0))
-    assert captured_serve(Choice.SYNTHESIZED, 8, 8, None)
+    assert captured_summed(Choice.AUTOMATIC, 8, 8, (-4.0, 5.0))
+    assert not captured_summed(Choice.AUTOMATIC, 2, 2, (-4.0, 5.0))
+    assert not captured_summed(Choice.AUTOMATIC, 5, 5, (-14.0, 14.0))  # 7 px from view to view: ghosts
+    assert captured_summed(Choice.AUTOMATIC, 2, 2, None)  # nothing else can be done without any disparity
+    assert captured_summed(Choice.CAPTURED, 2, 2, (-4.0, 5.0))
+    assert not captured_summed(Choice.SYNTHESIZED, 8, 8, (-4.0, 5.0))
+    assert captured_summed(Choice.SYNTHESIZED, 8, 8, None)
     assert captured_sliced(Choice.AUTOMATIC, 3, 3)
     assert not captured_sliced(Choice.AUTOMATIC, 2, 9)
     assert captured_sliced(Choice.CAPTURED, 2, 2)

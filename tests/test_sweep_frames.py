@@ -9,6 +9,7 @@ from lfcore import colormaps
 from lfcore.display_tone import brightened
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
+from lfcore.lightfield import LightField
 from lfcore.metrics import to_uint8
 from lfcore.sweep import horizontal
 from lfcore.sweep_frames import SweepFrames, remembering
@@ -127,6 +128,17 @@ def test_refocused_at_its_disparity_the_scene_stays_sharp(views: int) -> None:
     assert np.abs(frames.numbers(1) - truth(0.5, 0.5))[inside].max() > 0.1
     # 3 x 3 captured views would leave ghosts: the views in between are synthesized.
     assert (len(synthesizer.asked) > 30) == (views == 3)
+
+
+def test_dark_views_are_not_summed_up() -> None:
+    scene = light_field(5, 5)
+    views = scene.views.copy()
+    views[0, 0] = views[4, 4] = 0
+    dark = LightField(views, "x", "x", "x", dark=frozenset(((0, 0), (4, 4))))
+    plan = SweepPlan(KeyFramePath((Stop(0.5, 0.5, DISPARITY),)), 1, aperture=1.5)
+    inside = (slice(14, -14), slice(14, -14))
+    found = SweepFrames(plan, dark, TruthSynthesizer().synthesize).numbers(0)
+    assert np.abs(found - truth(0.5, 0.5))[inside].max() < 0.01
 
 
 def test_views_far_apart_are_not_summed_up() -> None:
