@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from assets import sample_path
 from lfcore.errors import InputError
@@ -100,7 +101,7 @@ class ExportChoices:
         """The whole sweep. Raises InputError where it is impossible."""
         if self.shape == KEY_FRAMES and not self.key_frames:
             raise InputError("The path has no key frame yet: go to a viewpoint and press K.")
-        return SweepPlan(
+        planned = _planned(
             self.path(),
             self.frames,
             self.fps,
@@ -112,6 +113,9 @@ class ExportChoices:
             self.aperture,
             self.plays,
         )
+        if isinstance(planned, str):
+            raise InputError(planned)
+        return planned
 
     def take(self, plan: SweepPlan) -> None:
         """Choose what a plan says."""
@@ -214,6 +218,15 @@ class ExportChoices:
             except InputError as error:
                 return str(error)
         return ""
+
+
+@lru_cache(maxsize=16)
+def _planned(path: ViewPath, *rest: Any) -> SweepPlan | str:
+    """The plan, or why it is impossible; asked on every frame, and slow for long ones."""
+    try:
+        return SweepPlan(path, *rest)
+    except InputError as error:
+        return str(error)
 
 
 @lru_cache(maxsize=64)

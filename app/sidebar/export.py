@@ -18,7 +18,6 @@ from app.state import Grid
 from app.widgets import button, choice, elided, em, font, heading, number, slider, text, tooltip, wrapped
 from lfcore.key_frames import MAX_FOCUS
 from lfcore.quilt import MAX_VIEWS
-from lfcore.sweep import MAX_FRAMES
 from lfcore.sweep_plan import GAIN_LIMITS, MAX_FPS, MAX_PLAYS, Layer
 
 _Chosen = TypeVar("_Chosen", bound=Enum)
@@ -33,6 +32,7 @@ _LAYERS = {
     "Image | disparity": Layer.BESIDE_DISPARITY,
 }
 _LEAST_FPS = 0.1
+_MOST_FRAMES = 9_999  # that can be typed; a file may say more
 _ESLF_SIDE = 14  # views that an ESLF holds along each side
 _SAME_MODEL = "as in the window"
 
@@ -83,7 +83,7 @@ def _length(choices: ExportChoices) -> None:
     imgui.same_line(_LABEL * em())
     imgui.set_next_item_width(4.4 * em())
     _, frames = imgui.input_int("##frames", choices.frames, 0)
-    choices.frames = min(max(frames, 1), MAX_FRAMES)
+    choices.frames = min(max(frames, 1), max(_MOST_FRAMES, choices.frames))
     tooltip("Number of frames")
     imgui.same_line()
     text("at", theme.TEXT_SOFT)
