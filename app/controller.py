@@ -594,14 +594,14 @@ class Controller:
         missing = self._scoreboard.missing_model(light_field, self.viewpoint) if self._wants_table else None
         if missing is not None:
             return Wish(Task.COMPARE, self.viewpoint, missing)
-        unscored = self._scoreboard.missing_view(self._grid, self.viewpoint)
+        unscored = self._scoreboard.missing_view(self.viewpoint)
         if self.state.score_all and unscored is not None:
             return Wish(Task.SCORE, unscored)
         if self.state.foresight and engine.has_room(light_field):
             for point in viewpoints_ahead(self.viewpoint, self._heading, self._grid):
                 if rounded(*point) not in self._cached:
                     return Wish(Task.AHEAD, point)
-        unscored = self._scoreboard.missing_view(self._grid, self.viewpoint, self._cached)  # which costs little
+        unscored = self._scoreboard.missing_view(self.viewpoint, self._cached)  # which costs little
         return Wish(Task.SCORE, unscored) if unscored is not None else None
 
     def _magnet(self, light_field: LightField) -> None:

@@ -21,15 +21,15 @@ class Scoreboard:
         self.views: tuple[ScoreText | None, ...] = ()  # of the model for a hand at rest, by number of the captured view
         self._engine = engine
         self._models = tuple(models)
-        self._scored: frozenset[Point] = frozenset()
+        self._unscored: tuple[Point, ...] = ()  # captured viewpoints
 
     def refresh(self, light_field: LightField | None, grid: Grid | None) -> None:
         """Take over what the engine has found."""
         if light_field is None or grid is None:
-            self.views, self._scored = (), frozenset()
+            self.views, self._unscored = (), ()
             return
         found = self._engine.scores(light_field)
-        self._scored = frozenset(found)
+        self._unscored = tuple(point for point in captured_viewpoints(grid) if rounded(*point) not in found)
         self.views = tuple(found.get(rounded(*grid.position(index))) for index in range(grid.rows * grid.columns))
 
     def table(self, light_field: LightField, here: Point) -> tuple[tuple[str, ScoreText | None], ...]:
@@ -43,9 +43,9 @@ class Scoreboard:
                 return model
         return None
 
-    def missing_view(self, grid: Grid, here: Point, among: Container[Point] | None = None) -> Point | None:
+    def missing_view(self, here: Point, among: Container[Point] | None = None) -> Point | None:
         """The nearest captured viewpoint that has no score yet; `among`: only these, as caches know them."""
-        points = [point for point in captured_viewpoints(grid) if rounded(*point) not in self._scored]
+        points = self._unscored
         if among is not None:
-            points = [point for point in points if rounded(*point) in among]
+            points = tuple(point for point in points if rounded(*point) in among)
         return min(points, key=lambda point: math.dist(point, here), default=None)

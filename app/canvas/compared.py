@@ -39,13 +39,13 @@ class Compared:
     def set_partner(self, image: FloatArray) -> None:
         """Take the synthesis by another model, (H, W, 3)."""
         self._model_image.write(np.ascontiguousarray(image, np.float32))
-        self._textures.current.clear()
+        self._forget()
 
     def set_map(self, values: FloatArray) -> None:
         """Take a map, (H, W); nan where there is no value."""
         finite = np.clip(np.nan_to_num(values, nan=_NO_VALUE, posinf=_LARGEST), _NO_VALUE, _LARGEST)
         self._map.write(np.ascontiguousarray(finite, np.float32))
-        self._textures.current.clear()
+        self._forget()
 
     def partner(self, source: Source, viewpoint: Point, tone: Tone) -> Picture:
         """The partner as it is looked at."""
@@ -82,6 +82,12 @@ class Compared:
         for value in (*vars(self).values(), *self._partners.values()):
             if isinstance(value, moderngl.Texture | moderngl.TextureArray | Picture):
                 value.release()
+
+    def _forget(self) -> None:
+        """What has been made here is out of date; other pictures are not."""
+        for value in (*vars(self).values(), *self._partners.values()):
+            if isinstance(value, Picture):
+                self._textures.current.pop(value, None)
 
     def _made(self, result: Picture, source: Source, viewpoint: Point, tone: Tone) -> Picture:
         if source is Source.INSTANT:
