@@ -182,7 +182,6 @@ class Controller:
             answer, self._next = self._next, None
             self._accept(answer)
         self._compare(self.light_field)
-        self._compare(self.light_field)
         self.eyes.look_up(self.light_field, self.state, self._cached)
         if not self.previewing:
             useless = self._resting and self._newest_disparity  # what was asked for elsewhere, to be carried here
@@ -342,7 +341,7 @@ class Controller:
     def _focus_facts(self) -> FocusFacts:
         state = self.state
         under = self._disparity_at(state.sliced) if state.focusing.slices and state.sliced is not None else None
-        return FocusFacts(focus_limits(self._span), under=under)
+        return FocusFacts(focus_limits(self._span), under=under, exact_eyes=len(self.eyes.answers) == 2)
 
     def _hand_waits(self) -> bool:
         """Whether the person waits for a view, which comes before exports."""
