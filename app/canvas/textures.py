@@ -69,7 +69,6 @@ class Textures:
         self.disparity_map = make_texture(context, self.size, 1, "f4")
         self.made_at: Point | None = None  # viewpoint of disparity_map
         self.nearest_disparity = 0.0
-        self.weights = make_texture(context, self.size, 4, "f1")
         self.weighed = False  # whether these are of the newest synthesis
         self.disparity = make_texture(context, self.size, 1, "f4")
         self.disparity_target = context.framebuffer([self.disparity])
@@ -78,11 +77,30 @@ class Textures:
         self.picture = Picture(context, self.size, picture_type, self)
         self.sheet = Picture(context, (2 * width, 2 * height), picture_type, self)
         self.precise = Picture(context, self.size, "f4", self)
-        self.inner = Picture(context, self.size, picture_type, self)
-        self.distances = Picture(context, self.size, "f4", self)
-        self.deviation = Picture(context, self.size, "f4", self, components=1)
         self.made = 0  # how often a target was made
         self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
+
+    # What only looking inside needs is made when it is first asked for.
+
+    @cached_property
+    def weights(self) -> moderngl.Texture:
+        """The weights of the inputs in the newest synthesis, where `weighed`."""
+        return make_texture(self.context, self.size, 4, "f1")
+
+    @cached_property
+    def inner(self) -> Picture:
+        """A picture of what is inside the synthesis."""
+        return Picture(self.context, self.size, self.picture_type, self)
+
+    @cached_property
+    def distances(self) -> Picture:
+        """How far the picture is from each warped input."""
+        return Picture(self.context, self.size, "f4", self)
+
+    @cached_property
+    def deviation(self) -> Picture:
+        """A map of deviations."""
+        return Picture(self.context, self.size, "f4", self, components=1)
 
     def outdated(self, target: object, *made_for: object) -> bool:
         """Whether the target was last made for something else; it counts as made for this from now on."""
