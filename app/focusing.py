@@ -74,11 +74,13 @@ class Focusing:
 @dataclass(frozen=True)
 class FocusFacts:
     """What panels print about it. `limits`: least and greatest focus of a slider, px over the baseline. `summed`: how many of
-    which views are summed up. `under`: the disparity where slices go through."""
+    which views are summed up. `under`: the disparity where slices go through. `exact_eyes`: both pictures of a stereo pair are
+    synthesized for their own viewpoints."""
 
     limits: tuple[float, float] = (-8.0, 8.0)
     summed: str = ""
     under: float | None = None
+    exact_eyes: bool = False
 
 
 def captured_summed(choice: Choice, rows: int, columns: int, span: tuple[float, float] | None) -> bool:

@@ -106,6 +106,14 @@ def test_the_finished_picture_is_that_of_the_library(
     np.testing.assert_allclose(found, np.clip(expected, 0, 1), atol=2e-5)
 
 
+@pytest.mark.parametrize("dtype", ["uint16", "float32"])
+def test_views_of_other_types_are_taken_in_8_bits(bench: Any, dtype: str) -> None:
+    values = np.random.default_rng(1).random((3, 3, 20, 24, 3)).astype(np.float32)
+    stored = values if dtype == "float32" else np.round(values * 65535).astype(np.uint16)
+    found = bench(LightField(stored, "x", "x", "x")).finished(Wanted((0.5, 0.5), 0.0, 0.0, True))
+    np.testing.assert_allclose(found, values[1, 1], atol=0.51 / 255)
+
+
 @pytest.mark.parametrize("disparity", [-6.0, 4.3])
 def test_a_plane_is_sharp_at_its_own_disparity_and_not_at_another(bench: Any, disparity: float) -> None:
     scene = in_8_bits(plane(disparity, (5, 5)))

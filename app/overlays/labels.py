@@ -28,6 +28,8 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
         labels.append((_capital(comparison.own_name(state, readout)), theme.TEXT))
     if state.look is Look.REFOCUS:
         labels.append((_focus_words(state, readout), theme.TEXT_SOFT))
+    elif state.look.is_stereo:
+        labels.append(("both eyes synthesized" if readout.focus.exact_eyes else "carried to both eyes", theme.TEXT_SOFT))
     tone = state.looking.tone.words()
     if tone and state.look.is_toned:
         labels.append((_capital(tone), theme.TEXT_SOFT))
@@ -53,8 +55,10 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
 
 
 def _focus_words(state: ViewState, readout: Readout) -> str:
-    summed = f", {readout.focus.summed}" if readout.focus.summed else ""
-    return f"at {number(state.focusing.focus, 2)} px{summed}"
+    focus, columns = state.focusing.focus, readout.grid.columns if readout.grid is not None else 2
+    per_view = f"{number(focus / (columns - 1), 2)} per view"
+    summed = f"; {readout.focus.summed}" if readout.focus.summed else ""
+    return f"at {number(focus, 2)} px, {per_view}{summed}"
 
 
 def _capital(words: str) -> str:
