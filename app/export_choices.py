@@ -12,6 +12,7 @@ from typing import Any
 from assets import sample_path
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
+from lfcore.quilt import Quilt, quilt_path
 from lfcore.sweep import PATHS
 from lfcore.sweep_plan import KeyFramePath, Layer, ShapePath, SweepPlan, ViewPath
 from lfcore.sweep_target import Kind, Target, check_fits
@@ -201,6 +202,16 @@ class ExportChoices:
         if self.product is Product.SWEEP:
             return folder / f"{self.name}{self.format.extension}"
         return folder / (self.name if self.product is Product.VIEWS else f"{self.name}.png")
+
+    @property
+    def quilt(self) -> Quilt:
+        """The quilt that is chosen."""
+        return Quilt(self.columns, self.rows, focus=self.focus[0] if self.refocus else 0.0)
+
+    def made(self, view: tuple[int, int]) -> Path:
+        """The file or folder that is made of views of that (width, height)."""
+        path = self.target_path
+        return quilt_path(path, self.quilt, view) if self.product is Product.QUILT else path
 
     @property
     def target(self) -> Target:

@@ -17,7 +17,7 @@ from app.exporting import Cancel, Done, Job
 from lfcore.errors import Cancelled, OutputError
 from lfcore.export import write_picture
 from lfcore.lightfield import FloatArray, LightField
-from lfcore.quilt import Quilt, quilt_path
+from lfcore.quilt import Quilt
 from lfcore.sweep_plan import SweepPlan
 from lfcore.sweep_target import Target
 from lfcore.synthesized_grid import check_grid_target, check_quilt_target, write_eslf, write_quilt, write_views
@@ -79,8 +79,8 @@ def chosen_job(choices: ExportChoices, source: Source) -> Job:
     if choices.product is Product.SWEEP:
         return sweep_job(choices.plan(), choices.target, source)
     if choices.product is Product.QUILT:
-        quilt = Quilt(choices.columns, choices.rows, focus=choices.focus[0] if choices.refocus else 0.0)
-        named = quilt_path(path, quilt, light_field)
+        quilt = choices.quilt
+        named = choices.made((light_field.width, light_field.height))
         write = partial(_write_quilt, path, quilt, source)
         return Job(f"Quilt of {quilt.columns} × {quilt.rows} views, {source.model}", named, quilt.columns * quilt.rows, write)
     side = choices.side

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lfcore.errors import InputError
-from lfcore.lightfield import LightField
 
 MAX_VIEWS = 64  # along one side of a grid or a quilt
 _ENDING = re.compile(r"_qs\d+x\d+a[\d.]+$")
@@ -35,9 +34,9 @@ class Quilt:
         return self.rows - 1 - up, column
 
 
-def quilt_path(path: Path, quilt: Quilt, light_field: LightField) -> Path:
-    """The file's name with the ending by which players of quilts know columns, rows and a view's aspect:
-    name_qs8x6a1.439.png."""
-    aspect = f"{light_field.width / light_field.height:.4g}"
+def quilt_path(path: Path, quilt: Quilt, view: tuple[int, int]) -> Path:
+    """The file's name with the ending by which players of quilts know columns, rows and a view's aspect, from its (width,
+    height): name_qs8x6a1.439.png."""
+    aspect = f"{view[0] / view[1]:.4g}"
     stem = path.stem if path.suffix.lower() == ".png" else path.name
     return path.with_name(f"{_ENDING.sub('', stem)}_qs{quilt.columns}x{quilt.rows}a{aspect}.png")

@@ -105,7 +105,7 @@ def check_quilt_target(path: str | os.PathLike[str], quilt: Quilt, light_field: 
     height, width = quilt.rows * light_field.height, quilt.columns * light_field.width
     if max(height, width) > MAX_QUILT_SIDE:
         raise InputError(f"The quilt would have {width} x {height} px; at most {MAX_QUILT_SIDE} a side: take fewer views.")
-    return check_target(quilt_path(Path(path), quilt, light_field), (".png",))
+    return check_target(quilt_path(Path(path), quilt, (light_field.width, light_field.height)), (".png",))
 
 
 def write_quilt(

@@ -90,7 +90,7 @@ def test_focus_puts_a_disparity_into_the_plane_of_the_screen(tmp_path: Path) -> 
     ],
 )
 def test_the_name_of_a_quilt_tells_columns_rows_and_aspect(given: str, named: str) -> None:
-    assert quilt_path(Path("d") / given, Quilt(8, 6), light_field(2, 2, SIZE)) == Path("d") / named
+    assert quilt_path(Path("d") / given, Quilt(8, 6), SIZE[::-1]) == Path("d") / named
 
 
 @pytest.mark.parametrize("name", ["eslf.png", "folder", "quilt.png"])

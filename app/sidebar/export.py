@@ -143,8 +143,8 @@ def _frames(choices: ExportChoices) -> None:
 
 def _grid(choices: ExportChoices, grid: Grid) -> None:
     if choices.product is Product.QUILT:
-        choices.columns = _whole("Columns", choices.columns, (1, MAX_VIEWS), "Views in a row of the quilt")
-        choices.rows = _whole("Rows", choices.rows, (2, MAX_VIEWS), "Rows of the quilt")
+        choices.columns = _whole("Across", choices.columns, (1, MAX_VIEWS), "Views in a row of the quilt")
+        choices.rows = _whole("Down", choices.rows, (2, MAX_VIEWS), "Rows of the quilt")
         _, choices.refocus = imgui.checkbox("Screen's plane", choices.refocus)
         tooltip("Shift the views so that a disparity lies in the plane of the screen; else it is 0")
         if choices.refocus:
@@ -176,7 +176,7 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
     with font(fonts.regular, theme.SMALL):
         if fault:
             wrapped(fault, theme.WARNING)
-        elif choices.target_path.is_file():
+        elif readout.grid is not None and choices.made((readout.grid.width, readout.grid.height)).is_file():
             wrapped("Replaces the file of that name", theme.WARNING)
         elif choices.product is Product.SWEEP:
             text(f"{choices.frames / choices.fps:.1f} s", theme.TEXT_FAINT)
