@@ -14,7 +14,6 @@ from app.state import GAIN_LIMITS, Look, ViewState
 from app.tone import Curve, Tone
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 
-
 LOOKING = Looking(Tone(Curve.GAMMA, stops=-1.5, gamma=1.8))
 
 
