@@ -15,8 +15,9 @@ LEVEL_STEP = (LEVEL_LIMITS[1] - LEVEL_LIMITS[0]) / 99
 # by colour-blind eyes too (Okabe and Ito 2008).
 CORNER_COLOURS = ((0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45), (0.80, 0.47, 0.65))
 
-# Likeness of a picture to a warped input: the mean squared difference over so many pixels to each side, by this tolerance.
-LEAN_REACH = 2
+# Likeness of a picture to a warped input: the mean squared difference over every second pixel, so many of these to each side,
+# by this tolerance.
+LEAN_REACH = 1
 LEAN_TOLERANCE = 0.04
 
 RANGE_LIMITS = (-99.0, 99.0)  # disparities, px over the baseline

@@ -143,20 +143,21 @@ class Samples:
             found = np.moveaxis(self.weights[:, *part.slices], 0, 2).astype(np.float32)
             return found / np.maximum(found.sum(2, keepdims=True), 1)
         assert self.disparity is not None
-        height, width = self.disparity.shape
-        wide = Part(
-            max(part.left - LEAN_REACH, 0),
-            max(part.top - LEAN_REACH, 0),
-            min(part.right + LEAN_REACH, width),
-            min(part.bottom + LEAN_REACH, height),
-        )
+        rows, columns = (np.arange(each.start, each.stop) // 2 for each in part.slices)  # in the grid of every second pixel
+        lasts = (self.disparity.shape[0] - 1) // 2, (self.disparity.shape[1] - 1) // 2
+        firsts = max(int(rows[0]) - LEAN_REACH, 0), max(int(columns[0]) - LEAN_REACH, 0)
+        ends = min(int(rows[-1]) + LEAN_REACH, lasts[0]), min(int(columns[-1]) + LEAN_REACH, lasts[1])
+        wide = Part(2 * firsts[1], 2 * firsts[0], 2 * ends[1] + 1, 2 * ends[0] + 1)
         image = self.image[wide.slices]
         squares = [np.where(inside, np.square(seen - image).sum(2), np.float32(1)) for seen, inside in self._all_warped(wide)]
-        distances = np.stack([*squares, np.ones_like(squares[0])], axis=2)  # (., ., 5); the last counts the pixels
-        before = (LEAN_REACH - (part.top - wide.top), LEAN_REACH - (part.left - wide.left))
-        after = (LEAN_REACH - (wide.bottom - part.bottom), LEAN_REACH - (wide.right - part.right))
-        padded = np.pad(distances, ((before[0], after[0]), (before[1], after[1]), (0, 0)))
-        sums = sliding_window_view(padded, (2 * LEAN_REACH + 1,) * 2, axis=(0, 1)).sum((3, 4))  # (h, w, 5)
+        distances = np.stack([*squares, np.ones_like(squares[0])], axis=2)[::2, ::2]  # (., ., 5); the last counts
+        missing = [
+            (LEAN_REACH - (int(places[0]) - first), LEAN_REACH - (end - int(places[-1])))
+            for places, first, end in zip((rows, columns), firsts, ends, strict=True)
+        ]
+        padded = np.pad(distances, (*missing, (0, 0)))
+        sums = sliding_window_view(padded, (2 * LEAN_REACH + 1,) * 2, axis=(0, 1)).sum((3, 4))
+        sums = sums[np.ix_(rows - rows[0], columns - columns[0])]  # (h, w, 5)
         mean = sums[..., :4] / sums[..., 4:]
         likeness = np.exp((mean.min(2, keepdims=True) - mean) / (2 * LEAN_TOLERANCE**2))
         return np.asarray(likeness / likeness.sum(2, keepdims=True), np.float32)

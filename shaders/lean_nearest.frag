@@ -2,15 +2,15 @@
 // Which warped input the picture is most like: a share falls with the mean squared difference around the pixel.
 #include "lean.glsl"
 
-uniform sampler2D distances;
-uniform int reach;        // so many pixels to each side
+uniform sampler2D distances;  // of every second pixel
+uniform int reach;        // so many of these to each side
 uniform float tolerance;  // differences much smaller than this count as none
 
 layout(location = 0) out vec4 colour;
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy), last = textureSize(distances, 0) - 1;
-    ivec2 first = max(pixel - reach, ivec2(0)), end = min(pixel + reach, last);
+    ivec2 here = ivec2(gl_FragCoord.xy) / 2, last = textureSize(distances, 0) - 1;
+    ivec2 first = max(here - reach, ivec2(0)), end = min(here + reach, last);
     vec4 sum = vec4(0.0);
     for (int y = first.y; y <= end.y; ++y) {
         for (int x = first.x; x <= end.x; ++x) {

@@ -94,8 +94,9 @@ class Textures:
 
     @cached_property
     def distances(self) -> Picture:
-        """How far the picture is from each warped input."""
-        return Picture(self.context, self.size, "f4", self)
+        """How far the picture is from each warped input, for every second pixel of every second row."""
+        width, height = self.size
+        return Picture(self.context, ((width + 1) // 2, (height + 1) // 2), "f4", self)
 
     @cached_property
     def deviation(self) -> Picture:
