@@ -32,7 +32,7 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
         labels.append(("both eyes synthesized" if readout.focus.exact_eyes else "carried to both eyes", theme.TEXT_SOFT))
     tone = state.looking.tone.words()
     if tone and state.look.is_toned:
-        labels.append((_capital(tone), theme.TEXT_SOFT))
+        labels.append((f"Tone: {tone}", theme.TEXT_SOFT))
     if is_extrapolated(state.u, state.v):
         labels.append(("Extrapolated", theme.WARNING))
     if state.captured and state.look is Look.SYNTHESIS and readout.captured_here is None:
