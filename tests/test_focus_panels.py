@@ -14,7 +14,7 @@ from test_panels import OPEN, Screen
 
 from app.controller import Controller
 from app.engine import Engine
-from app.focusing import BASELINES, FOCUS_STEP, FocusFacts, place_in_slice
+from app.focusing import BASELINES, FOCUS_STEP, Choice, FocusFacts, place_in_slice
 from app.geometry import place
 from app.keyboard import _KEYS
 from app.state import Look, Tab
@@ -68,6 +68,14 @@ def test_keys_of_refocusing(screen: Screen) -> None:
     assert state.look is Look.REFOCUS
     screen.press("O")
     assert state.look is Look.SYNTHESIS
+
+
+def test_the_views_that_are_summed_up_are_chosen_by_a_key(screen: Screen) -> None:
+    seen = []
+    for _ in Choice:
+        chord(screen, "V")
+        seen.append(screen.state.focusing.views)
+    assert seen == [Choice.CAPTURED, Choice.SYNTHESIZED, Choice.AUTOMATIC]
 
 
 def test_a_click_focuses_while_refocusing_and_a_drag_does_not(screen: Screen) -> None:
@@ -183,6 +191,16 @@ def test_the_tab_changes_everything_by_mouse(screen: Screen) -> None:
     assert -8.0 <= state.focusing.focus <= 9.0
     find(screen, lambda: state.focusing.slices, box)
     find(screen, lambda: state.focusing.pin is not None, box)
+
+
+def test_the_tab_leaves_alone_what_nobody_moves(screen: Screen) -> None:
+    state = screen.state
+    state.tab = Tab.FOCUS
+    # No number of these is one of single precision, in which sliders compute, and the focus lies beyond its slider.
+    state.focusing = chosen = replace(state.focusing, focus=31.7, aperture=0.8, baseline=0.3, convergence=-1.1)
+    screen.frame(3)
+    assert state.look is Look.SYNTHESIS
+    assert state.focusing == chosen
 
 
 @pytest.mark.parametrize("size", [(200, 150), (640, 400), (5000, 3000)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.commands.kinds import FOCUSING, Command, Context, Run
-from app.focusing import BASELINES, FOCUS_STEP
+from app.focusing import BASELINES, FOCUS_STEP, Choice
 from app.state import Look
 
 _STEREO = (Look.ANAGLYPH, Look.STEREO_PARALLEL, Look.STEREO_CROSSED)  # in the order of the key
@@ -43,6 +43,14 @@ def _aperture(steps: int) -> Run:
     return run
 
 
+def _views(context: Context) -> None:
+    """The next choice of views to be summed up, or sliced."""
+    state = context.state
+    choices = list(Choice)
+    following = choices[(choices.index(state.focusing.views) + 1) % len(choices)]
+    state.focusing = replace(state.focusing, views=following)
+
+
 def _slices(context: Context) -> None:
     state = context.state
     state.focusing = replace(state.focusing, slices=not state.focusing.slices)
@@ -76,6 +84,7 @@ COMMANDS: dict[str, Command] = {
     "farther": Command(("]",), "Focus, or let stereo converge, farther", FOCUSING, _focus(FOCUS_STEP)),
     "smaller aperture": Command(("Y",), "A smaller aperture: more is sharp", FOCUSING, _aperture(-1)),
     "larger aperture": Command(("Shift+Y",), "A larger aperture: less is sharp", FOCUSING, _aperture(1)),
+    "views": Command(("Shift+V",), "Sum up, and slice, other views: captured, synthesized, automatic", FOCUSING, _views),
     "slices": Command(("U",), "Epipolar slices through the cursor, below and beside the picture", FOCUSING, _slices),
     "pin": Command(("Shift+U",), "Pin the slices where the cursor is, or let them follow it", FOCUSING, _pin),
     "stereo": Command(("J",), "Stereo: red and cyan, side by side, crossed, none", FOCUSING, _stereo),

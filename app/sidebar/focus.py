@@ -39,16 +39,16 @@ def _refocus(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
         "while refocusing, takes that of what is under it.  ([ and ])"
     )
     focus = slider("Focus", before.focus, readout.focus.limits, f"{number(before.focus, 2)} px", hint)
-    if focus != before.focus:
+    if _moved(before.focus, focus):
         state.refocus_at(focus)
     hint = "Diameter of the aperture in baselines. 0 is a pinhole; at 1 it reaches the outermost views.  (Y and Shift+Y)"
     aperture = slider("Aperture", before.aperture, APERTURE_LIMITS, number(before.aperture, 2), hint)
-    if aperture != before.aperture:
+    if _moved(before.aperture, aperture):
         state.focusing = replace(state.focusing, aperture=aperture)
         state.look = Look.REFOCUS
     hint = (
         "The views that are summed up. Captured: the camera's own. Synthesized: 9 × 9, carried from the newest synthesis by "
-        "its disparity. Automatic: captured ones where they lie so close that what is out of focus is smooth."
+        "its disparity. Automatic: captured ones where they lie so close that what is out of focus is smooth.  (Shift+V)"
     )
     views = Choice(choice("Views", before.views.value, _CHOICES, hint))
     if views is not before.views:
@@ -79,5 +79,10 @@ def _stereo(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     convergence = slider(
         "Screen", focusing.convergence, readout.focus.limits, f"{number(focusing.convergence, 2)} px", hint
     )
-    if (baseline, convergence) != (focusing.baseline, focusing.convergence):
+    if _moved(focusing.baseline, baseline) or _moved(focusing.convergence, convergence):
         state.focusing = replace(state.focusing, baseline=baseline, convergence=convergence)
+
+
+def _moved(before: float, after: float) -> bool:
+    """Whether a slider has been moved: it gives what it was given in single precision."""
+    return abs(after - before) > 1e-5 * max(abs(before), 1.0)
