@@ -311,14 +311,16 @@ class Controller:
         self.state.panel = True
 
     def _play(self, now: float) -> None:
-        """Move the viewpoint along the path that is played; a drag stops it."""
+        """Move the viewpoint along the path that is played; anything else that moves it stops that."""
         choices = self.state.export
-        if self.state.dragging:
+        if self.state.dragging or choices.placed not in (None, self.viewpoint):
             choices.playing = False
         stop = choices.stop_at(now)
         if stop is None:
+            choices.placed = None
             return
         self.state.move_to(stop.u, stop.v)
+        choices.placed = self.viewpoint
         if stop.focus is not None:
             self.state.focusing = replace(self.state.focusing, aperture=choices.aperture)
             self.state.refocus_at(stop.focus)

@@ -89,6 +89,7 @@ class ExportChoices:
     name: str = "sweep"
     playing: bool = False
     started: float | None = None  # when the preview began
+    placed: tuple[float, float] | None = None  # where it has put the viewpoint
     seen_exports: int = 0  # number of the newest export that has been brought into sight
 
     def path(self) -> ViewPath:
@@ -164,7 +165,7 @@ class ExportChoices:
 
     def play(self) -> None:
         """Begin to move the viewpoint along the path, or stop."""
-        self.playing, self.started = not self.playing, None
+        self.playing, self.started, self.placed = not self.playing, None, None
 
     def stop_at(self, now: float) -> Stop | None:
         """Where the preview is, `now` in seconds; None while it is not played, or the path is impossible."""

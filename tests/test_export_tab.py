@@ -45,8 +45,10 @@ def test_keys_add_and_remove_key_frames_and_play(screen: Screen) -> None:
     assert [(key.u, key.v) for key in export.key_frames] == [(0.25, 0.75), (0.5, 0.5)]
     screen.press("Shift+K")
     assert len(export.key_frames) == 1
+    screen.state.swaying = True
     screen.press("Ctrl+Shift+K")
     assert export.playing
+    assert not screen.state.swaying
     screen.press("Ctrl+Shift+K")
     assert not export.playing
 
@@ -204,6 +206,15 @@ def test_the_preview_moves_the_viewpoint_until_it_is_dragged(controller: Control
     controller.tick(105.0)
     assert not export.playing
     assert controller.viewpoint == (0.9, 0.9)
+    controller.state.dragging = False
+    export.play()
+    controller.tick(106.0)
+    controller.tick(106.1)
+    assert export.playing
+    controller.state.move_to(0.5, 0.5)  # by a key
+    controller.tick(107.0)
+    assert not export.playing
+    assert controller.viewpoint == (0.5, 0.5)
 
 
 def test_the_preview_of_a_focus_sweep_refocuses(controller: Controller) -> None:

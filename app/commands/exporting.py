@@ -20,6 +20,7 @@ def _remove(context: Context) -> None:
 
 
 def _play(context: Context) -> None:
+    context.state.swaying = False
     context.state.export.play()
 
 
