@@ -279,7 +279,6 @@ class Controller:
             loading=self._loading.share if self._loading.path is not None else None,
             loading_name=self._loading.path.name if self._loading.path is not None else "",
             messages=tuple(self.messages),
-            score=answer.score if answer else None,
             timings=tuple(newest.synthesis.timings.items()) if newest else (),
             disparity_range=self.disparity_range,
             has_disparity=self._newest_disparity,

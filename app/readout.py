@@ -64,7 +64,6 @@ class Readout:
     loading: float | None = None  # fraction read of the light field being opened, None when none is
     loading_name: str = ""
     messages: tuple[str, ...] = ()
-    score: ScoreText | None = None
     timings: tuple[tuple[str, float], ...] = ()  # seconds by stage of the newest synthesis
     disparity_range: tuple[float, float] | None = None  # px over the baseline, at the chosen percentiles
     has_disparity: bool = False

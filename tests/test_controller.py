@@ -138,15 +138,15 @@ def test_a_query_for_another_viewpoint_is_given_up_when_the_hand_rests(program: 
 
 def test_score_is_that_of_the_picture_on_screen_against_the_captured_view(program: Program) -> None:
     program.open("3x3")
-    program.until(lambda: program.controller.readout(None).score is not None)  # the centre of 3 x 3 is a captured view
-    score = program.controller.readout(None).score
+    program.until(lambda: program.controller.readout(None).compared.score is not None)  # the centre of 3 x 3 is a captured view
+    score = program.controller.readout(None).compared.score
     assert score is not None
     expected = k16(truth(0.5, 0.5), light_field(3, 3).view(1, 1))
     assert (score.psnr, score.ssim) == pytest.approx((expected.psnr, expected.ssim))
     assert "K16" in score.protocol
     program.controller.state.move_to(0.3, 0.5)
     program.until_full()
-    assert program.controller.readout(None).score is None
+    assert program.controller.readout(None).compared.score is None
 
 
 def test_captured_step_only_where_there_is_a_captured_view(program: Program) -> None:
@@ -536,7 +536,7 @@ def test_what_one_run_has_synthesized_the_next_one_has_at_once(tmp_path: Path) -
         second.open("3x3")
         second.until_full()
         assert second.controller.readout(None).from_cache
-        assert second.controller.readout(None).score is not None
+        assert second.controller.readout(None).compared.score is not None
         second.until(lambda: len(second.controller.readout(None).cached) == 2)
         second.controller.state.move_to(0.3, 0.4)
         second.tick()

@@ -14,7 +14,7 @@ from app.geometry import place
 from app.keyboard import _CHARACTERS, _KEYS
 from app.layout import Layout, lay_out
 from app.picture import DRAG_SPAN
-from app.readout import Readout, ScoreText
+from app.readout import Compared, Readout, ScoreText
 from app.state import Grid, Look, Step, Tab, ViewState
 
 GRID = Grid(rows=8, columns=8, width=541, height=376)
@@ -357,7 +357,7 @@ STATES = {
         loading=0.7,
         loading_name="other",
         messages=("A long sentence that says what was found, what was expected and what to do about it." * 3,),
-        score=ScoreText(37.5, 0.97, "K16"),
+        compared=Compared(True, ScoreText(37.5, 0.97, "K16")),
         timings=(("features", 0.3), ("total", 1.2)),
         disparity_range=(-3.0, 4.0),
         has_disparity=True,

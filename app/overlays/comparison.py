@@ -55,7 +55,8 @@ def partner_name(state: ViewState, readout: Readout) -> str:
     """What the picture is compared with, and whether that is there."""
     partner, score = state.comparison.partner, readout.compared.score
     if readout.compared.there:
-        return partner if score is None or state.look is Look.ERROR else f"{partner}   {score_words(score)}"
+        of_what_is_shown = state.look is Look.SYNTHESIS and readout.step is not Step.CAPTURED
+        return f"{partner}   {score_words(score)}" if score is not None and of_what_is_shown else partner
     if partner == CAPTURED_VIEW:
         return "no captured view here"
     return f"{partner}: not yet" if partner != INSTANT else "no disparity yet"

@@ -12,7 +12,7 @@ from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement, Difference, part
 from app.readout import Readout, ScoreText
 from app.scoring import RULES
 from app.sidebar import score_map
-from app.state import GAIN_LIMITS, Look, Step
+from app.state import GAIN_LIMITS, Look
 from app.widgets import DASH, choice, decibels, em, heading, number, slider, text, tile, tooltip
 
 
@@ -80,15 +80,14 @@ def _score(context: Context, readout: Readout) -> None:
         text(_why_no_score(context, readout), theme.TEXT_FAINT)
         return
     text(f"{decibels(score.psnr)}    SSIM {number(score.ssim, 4)}")
-    tooltip(f"The picture on screen against its partner, from the very values that are shown. {score.protocol}")
+    tooltip(f"The synthesis against its partner, from the very values that are shown. {score.protocol}")
 
 
 def _why_no_score(context: Context, readout: Readout) -> str:
     partner = context.state.comparison.partner
-    if partner == CAPTURED_VIEW and readout.captured_here is None:
-        return "No captured view at this viewpoint"
-    if partner == CAPTURED_VIEW and readout.step is Step.CAPTURED:
-        return "The camera's own view"
+    if partner == CAPTURED_VIEW:
+        there = readout.captured_here is not None
+        return "Scored when the synthesis is there" if there else "No captured view at this viewpoint"
     return "Scored when the hand rests" if partner == INSTANT else "Scored when both syntheses are there"
 
 
