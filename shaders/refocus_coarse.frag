@@ -2,7 +2,7 @@
 // A few of the views, shifted by whole pixels and averaged: the first picture of a new focus.
 #include "tone.glsl"
 
-const int COUNT = 12;
+const int COUNT = 10;
 
 uniform sampler2D views;      // many, tile beside tile
 uniform ivec2 size;           // of one

@@ -21,7 +21,7 @@ from app.geometry import Point
 from app.tone import Tone
 from lfcore.refocus import aperture_weights
 
-_COARSE = 12  # views, as in refocus_coarse.frag
+_COARSE = 10  # views, as in refocus_coarse.frag
 _MOST = 16  # views of a chunk, as in refocus_row.frag
 _NEW_VIEWS = 8  # while views are still coming, the coarse picture is drawn again after so many
 _READS_PER_FRAME = 4_000_000  # of pixels, about a millisecond for each million where two cores of a processor draw
@@ -64,6 +64,7 @@ class Refocused:
         self._sums: _Sums | None = None
         self._summing: tuple[object, ...] = ()  # what is being, or has been, summed up
         self._waiting: list[_Chunk] = []
+        self._summed_up = 0  # chunks
         self.words = ""  # which views are summed up
 
     def set_views(self, views: npt.NDArray[np.generic], dark: frozenset[tuple[int, int]]) -> None:
@@ -132,7 +133,7 @@ class Refocused:
         self._summing = summing
         self._waiting = _chunks(wanted, gathered, self._chunk_size) if gathered.complete else []
         self.words = gathered.words(int(np.count_nonzero(_weights(wanted, gathered))))
-        self._at_hand.sum_target.clear()
+        self._summed_up = 0
         return True
 
     @property
@@ -159,10 +160,12 @@ class Refocused:
                 },
             )
             sums.sum_target.use()
-            self._context.enable_only(moderngl.BLEND)
-            self._context.blend_func = moderngl.ONE, moderngl.ONE
+            if self._summed_up:  # the first takes the place of what was there before
+                self._context.enable_only(moderngl.BLEND)
+                self._context.blend_func = moderngl.ONE, moderngl.ONE
             self._passes.get("refocus_column.frag").render({"row": sums.row}, {"shift": chunk.down})
             self._context.disable(moderngl.BLEND)
+            self._summed_up += 1
             reads += width * height * _TAPS * (count + 1)
 
     def _coarse(self, wanted: Wanted, gathered: Gathered, tone: Tone) -> None:
