@@ -423,6 +423,7 @@ class Controller:
         self.eyes.forget()
         self._span = None
         self.state.pick = self.state.sliced = None
+        self.state.focusing = replace(self.state.focusing, pin=None)
         self._shown = None
         self._heading = (0.0, 0.0)
         self._grid = None

@@ -238,6 +238,15 @@ def test_a_pick_waits_for_the_disparity_and_becomes_the_focus(controller: Contro
     assert not controller.captured_summed  # 3 x 3 captured views are too few
 
 
+def test_another_light_field_is_not_sliced_where_the_last_one_was(controller: Controller) -> None:
+    controller.show_light_field(light_field())
+    state = controller.state
+    state.focusing, state.sliced = replace(state.focusing, slices=True, pin=(100.0, 90.0)), (100.0, 90.0)
+    controller.show_light_field(light_field(size=(40, 50)))
+    assert state.focusing.slices
+    assert (state.focusing.pin, state.sliced) == (None, None)
+
+
 def test_a_path_with_a_focus_drives_the_focus(controller: Controller) -> None:
     controller.show_light_field(light_field())
     choices = controller.state.export
