@@ -223,7 +223,7 @@ def _gaussian(values: DoubleArray) -> DoubleArray:
 
 
 def _gaussian_along(values: DoubleArray, axis: int) -> DoubleArray:
-    """The same along one axis, as products with blocks of the filter's matrix: a quarter of the processor's time of tap by tap."""
+    """The same along one axis, as products with blocks of the filter's matrix, in a quarter of the time of tap by tap."""
     ahead = np.moveaxis(values, axis, 0)
     length = ahead.shape[0]
     rows = np.ascontiguousarray(ahead).reshape(length, -1)  # (length, all else)
