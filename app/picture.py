@@ -25,7 +25,9 @@ def draw(area: Rect, panes: tuple[Pane, ...], state: ViewState, picture: Size, s
     _hover(state, picture, area, hovered)
     columns, rows = state.look.tiles
     if state.cursor is not None:
-        state.cursor = (state.cursor[0] % (picture[0] / columns), state.cursor[1] % (picture[1] / rows))
+        column, x = divmod(state.cursor[0], picture[0] / columns)
+        row, y = divmod(state.cursor[1], picture[1] / rows)
+        state.cursor, state.tile = (x, y), (int(column), int(row))
     if delta is not None:
         _pick(state)
 

@@ -124,7 +124,7 @@ class Samples:
         if look is Look.WARPED_ALL:
             return self._of_picture(self._sheet(part), part, looking)
         if look.corner is not None:
-            return self._of_picture(self._warped(look.corner, part)[0], part, looking)
+            return self._of_picture(self.warped(look.corner, part), part, looking)
         if look is Look.DISAGREEMENT:
             return _of_map(255 * self._disagreement(part), (0.0, 255 / gain), part, looking, 1, "of 255")
         if look is not Look.LEAN:
@@ -135,6 +135,10 @@ class Samples:
             shown = (shares / np.maximum(shares.max(2, keepdims=True), 1e-6)) ** np.float32(gain)
             shown = shown / np.maximum(shown.sum(2, keepdims=True), 1e-6)
         return Patch(part, 100 * shares, shown @ np.array(CORNER_COLOURS, np.float32), 0, "% of the inputs")
+
+    def warped(self, corner: int, part: Part) -> FloatArray:
+        """A corner view, warped by the disparity, as stored, 0 where it has no sample: (h, w, 3)."""
+        return self._warped(corner, part)[0]
 
     def shares(self, part: Part) -> FloatArray:
         """How much of each warped input is in the picture, (h, w, 4) in the order of CORNERS, sum 1: by weights, or where the
@@ -194,7 +198,7 @@ class Samples:
             if left < right and top < bottom:
                 place = Part(left - part.left, top - part.top, right - part.left, bottom - part.top)
                 seen = Part(left - x, top - y, right - x, bottom - y)
-                values[place.slices] = self._warped(corner, seen)[0]
+                values[place.slices] = self.warped(corner, seen)
         return values
 
     def _all_warped(self, part: Part) -> list[tuple[FloatArray, npt.NDArray[np.bool_]]]:

@@ -209,6 +209,7 @@ class ViewState:
     path_field: bool = False
     path_text: str = ""
     cursor: Point | None = None  # in picture pixels, None outside
+    tile: tuple[int, int] = (0, 0)  # column and row of the picture, of those that the look shows, with the cursor in it
     inspector: bool = False
     swaying: bool = False  # the viewpoint moves by itself on a small circle
     desk: Desk = field(default_factory=Desk)  # what lies around the picture

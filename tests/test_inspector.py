@@ -13,7 +13,7 @@ from app.overlays.pixels import seen
 from app.panels import picture_size
 from app.samples import Part, Samples
 from app.state import Look
-from lfcore.lightfield import LightField
+from lfcore.lightfield import CORNERS, LightField
 from tests.test_panels import OPEN, Screen
 
 HEIGHT, WIDTH = 376, 541
@@ -110,6 +110,18 @@ def test_a_double_click_goes_to_1_to_1_about_the_cursor_and_back(screen: Screen)
             screen.frame()
             screen.io.delta_time = 0.02
     assert (state.u, state.v) == (0.5, 0.5)
+
+
+def test_on_the_sheet_the_input_under_the_cursor_is_known(screen: Screen) -> None:
+    state, area = screen.state, screen.layout.picture
+    state.look, state.inspector = Look.WARPED_ALL, True
+    screen.frame(2)
+    placement = place(state.zoom, picture_size(screen.readout, state), area)
+    for u, v in CORNERS:
+        screen.move(*placement.to_window((u * WIDTH + 100.5, v * HEIGHT + 50.5)))
+        screen.frame()
+        assert state.tile == (u, v)
+        assert state.cursor == pytest.approx((100.5, 50.5), abs=1.2)  # the mouse is on whole pixels of the window
 
 
 def test_a_part_is_rows_and_columns() -> None:

@@ -6,7 +6,6 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
 from app.geometry import Rect
-from app.looking import Looking
 from app.readout import Readout
 from app.samples import Part, Samples
 from app.state import Look, ViewState
@@ -36,7 +35,7 @@ def inspector(area: Rect, state: ViewState, readout: Readout) -> None:
             if state.look in _DETAILS:
                 _row(_DETAILS[state.look], DASH)
             return
-        stored = _stored(samples, part, state, readout)
+        stored = _stored(samples, part, state)
         _row("Stored", _row_of(stored, 4))
         shown = toned(stored[None, None], state.looking.tone)[0, 0]
         _swatch(shown)
@@ -63,12 +62,11 @@ def _under(state: ViewState) -> Part | None:
     return Part(x, y, x + 1, y + 1)
 
 
-def _stored(samples: Samples, part: Part, state: ViewState, readout: Readout) -> FloatArray:
+def _stored(samples: Samples, part: Part, state: ViewState) -> FloatArray:
     """The picture's values, 1 = white: those of a warped input where one is looked at."""
-    if state.look.corner is not None:
-        patch = samples.patch(state.look, part, Looking(), 1.0, (0.0, 1.0))
-        if patch is not None:
-            return patch.values[0, 0] / 255
+    corner = CORNERS.index(state.tile) if state.look is Look.WARPED_ALL else state.look.corner
+    if corner is not None and samples.disparity is not None:
+        return samples.warped(corner, part)[0, 0]
     return samples.picture(part)[0, 0]
 
 
