@@ -31,7 +31,7 @@ from app.samples import Samples
 from app.sampling import Sampler
 from app.scoreboard import Scoreboard
 from app.scoring import DEFAULT_RULE, RULES
-from app.state import CARRIED, Grid, Look, Step, Tab, ViewState, carried_share
+from app.state import SEAMLESS, Grid, Look, Step, Tab, ViewState, carried_share
 from app.sway import Sway
 from lfcore.cache import rounded
 from lfcore.errors import LfviewError
@@ -503,7 +503,7 @@ class Controller:
         newest = self.newest
         if newest is None or not newest.step is answer.step is Step.REALTIME:
             return False
-        return math.dist(_viewpoint_of(newest), _viewpoint_of(answer)) <= CARRIED.near
+        return math.dist(_viewpoint_of(newest), _viewpoint_of(answer)) <= SEAMLESS
 
     def _follow(self, light_field: LightField) -> None:
         """The viewpoint has moved."""

@@ -136,6 +136,7 @@ CARRIED = Reach(0.2, 0.3)  # between the two, both are equally near to what the 
 # The corner views cost a software rasteriser three times as much as a synthesis that is carried: time which the networks, on
 # the same cores, need for the synthesis that would take its place.
 CARRIED_IN_SOFTWARE = Reach(0.5, 0.7)
+SEAMLESS = 0.1  # one quick synthesis takes the place of another so near without a fade: the change cannot be seen
 
 
 def carried_share(distance: float, reach: Reach = CARRIED) -> float:
