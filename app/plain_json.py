@@ -111,4 +111,6 @@ def _dataclass(kind: Any, data: Json) -> Any:
     if not isinstance(data, dict):
         raise ValueError("no object")
     expected = field_types(kind)
+    if not data.keys() <= expected.keys():
+        raise ValueError("an unknown field")
     return kind(**{name: from_json(expected[name], each) for name, each in data.items()})
