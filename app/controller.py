@@ -26,12 +26,13 @@ from app.focusing import FocusFacts, captured_sliced, captured_summed, carried_d
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
+from app.on_screen import OnScreen, viewpoint_of
 from app.readout import Compared, Readout
 from app.samples import Samples
 from app.sampling import Sampler
 from app.scoreboard import Scoreboard
 from app.scoring import DEFAULT_RULE, RULES
-from app.state import SEAMLESS, Grid, Look, Step, Tab, ViewState, carried_share
+from app.state import Grid, Look, Step, Tab, ViewState, carried_share
 from app.sway import Sway
 from lfcore.cache import rounded
 from lfcore.errors import LfviewError
@@ -39,16 +40,11 @@ from lfcore.lightfield import LightField
 from lfcore.sweep_plan import is_plan_file
 
 REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
-FADE_SECONDS = 0.1
-STREAM_FADE_SECONDS = 0.06  # while the hand moves
 QUIET_SECONDS = 0.6  # after the last thing that the person did, views are computed ahead
-# A synthesis for a viewpoint that the hand has left is of use as long as it is not much farther off than the one at hand.
-_FARTHER = 0.02
 # A dragged viewpoint that comes to rest this near to a captured or a cached one goes there: no pixel of an ordinary light
 # field moves visibly by it, and the camera's view or the finished picture is there at once.
 MAGNET_RADIUS = 0.012
 STOP_SECONDS = 10.0
-_SPAN_TAIL = 1.0  # per cent of the disparities left out at either end of a scene's range
 
 
 class Controller:
@@ -66,8 +62,6 @@ class Controller:
         self.state = ViewState()
         self.light_field: LightField | None = None
         self.exhibition: Exhibition | None = None  # what is open in place of a light field
-        self.newest: Answer | None = None  # what is on screen, carried by its disparity map to the viewpoint
-        self.picture: Answer | None = None  # the same, where it was made for exactly the viewpoint on screen
         self.folder: Folder | None = None  # what there is to choose from in the browser
         self.messages: list[str] = []
         self._engine = engine
@@ -85,14 +79,12 @@ class Controller:
         self.exports = Exports(self._models, wake, self._hand_waits)
         self.eyes = Eyes(engine)
         self._grid: Grid | None = None
-        self._next: Answer | None = None  # has come while the one before is still being faded in
-        self._span: tuple[float, float] | None = None  # least and greatest disparity of the scene, by the first map
+        self._screen = OnScreen()
         self._shown: Point | None = None  # viewpoint at the last tick
         self._heading: Point = (0.0, 0.0)
         self._moved_at = -math.inf
         self._acted_at = -math.inf
         self._acted = False
-        self._fade_from, self._fade_seconds = -math.inf, FADE_SECONDS
         self._now = 0.0
         self._cached: dict[Point, None] = {}  # viewpoints in memory, the one used longest ago first
         self._faulted = False  # the last query failed, and the viewpoint has not moved since
@@ -178,9 +170,7 @@ class Controller:
             if not self.state.dragging:
                 self.state.hand = None
         self._shown = self.viewpoint
-        if self._next is not None and self.share >= 1.0:
-            answer, self._next = self._next, None
-            self._accept(answer)
+        self._screen.at(now, self.viewpoint, self._resting)
         self._compare(self.light_field)
         self.eyes.look_up(self.light_field, self.state, self._cached)
         if not self.previewing:
@@ -206,7 +196,17 @@ class Controller:
     @property
     def share(self) -> float:
         """How far the newest synthesis has been faded in over what was on screen before it."""
-        return min(max((self._now - self._fade_from) / self._fade_seconds, 0.0), 1.0)
+        return self._screen.share
+
+    @property
+    def newest(self) -> Answer | None:
+        """The synthesis on screen, carried by its disparity map to the viewpoint."""
+        return self._screen.newest
+
+    @property
+    def picture(self) -> Answer | None:
+        """The same, where it was made for exactly the viewpoint on screen."""
+        return self._screen.picture
 
     @property
     def next_frame_in(self) -> float | None:
@@ -234,7 +234,7 @@ class Controller:
             return self.picture.step
         if self.newest is None or not self._newest_disparity:
             return Step.BLEND
-        carried = carried_share(math.dist(_viewpoint_of(self.newest), self.viewpoint))
+        carried = carried_share(math.dist(viewpoint_of(self.newest), self.viewpoint))
         return Step.REALTIME if self.newest.step is Step.REALTIME and carried >= 0.5 else Step.INSTANT
 
     @property
@@ -337,12 +337,12 @@ class Controller:
         newest = self.newest
         if newest is None or newest.synthesis.disparity is None:
             return None
-        return carried_disparity(newest.synthesis.disparity, _viewpoint_of(newest), self.viewpoint, point)
+        return carried_disparity(newest.synthesis.disparity, viewpoint_of(newest), self.viewpoint, point)
 
     def _focus_facts(self) -> FocusFacts:
         state = self.state
         under = self._disparity_at(state.sliced) if state.focusing.slices and state.sliced is not None else None
-        return FocusFacts(focus_limits(self._span), under=under, exact_eyes=len(self.eyes.answers) == 2)
+        return FocusFacts(focus_limits(self._screen.span), under=under, exact_eyes=len(self.eyes.answers) == 2)
 
     def _hand_waits(self) -> bool:
         """Whether the person waits for a view, which comes before exports."""
@@ -356,10 +356,8 @@ class Controller:
         self._engine.use(name, choice.make, choice.stands_in)
         self.eyes.forget()
         self._asking.forget()
-        self._next = None
         self._faulted = False
-        if self.newest is not None:
-            self.newest = replace(self.newest, final=False)
+        self._screen.outdate()
         if self.light_field is not None:
             self._count(self.light_field)
             self._look_up(self.light_field)
@@ -368,7 +366,7 @@ class Controller:
     def captured_summed(self) -> bool:
         """Whether refocusing sums up captured views, not such as are drawn in between."""
         grid = self._grid
-        return grid is None or captured_summed(self.state.focusing.views, grid.rows, grid.columns, self._span)
+        return grid is None or captured_summed(self.state.focusing.views, grid.rows, grid.columns, self._screen.span)
 
     @property
     def captured_sliced(self) -> bool:
@@ -417,11 +415,10 @@ class Controller:
         if opened is not None:
             self.state.export.suggest(opened.source, opened.name)
         self.previewing = False
-        self.newest = self.picture = self._next = None
+        self._screen.clear()
         self._asking.forget()
         self.comparing.forget()
         self.eyes.forget()
-        self._span = None
         self.state.pick = self.state.sliced = None
         self.state.focusing = replace(self.state.focusing, pin=None)
         self._shown = None
@@ -470,40 +467,9 @@ class Controller:
                 if answered.wish.task is Task.COMPARE:
                     self.comparing.take(answered.wish, answered.answer)
                 else:
-                    self._accept(answered.answer)
+                    self._screen.accept(answered.answer, self.viewpoint, self._resting)
         for message in self.comparing.news():
             self.say(message)
-
-    def _accept(self, answer: Answer) -> None:
-        """Show an answer, unless something better is on screen, once what is there has been faded in."""
-        here = self.viewpoint
-        exact = _viewpoint_of(answer) == here
-        if self.picture is not None and (not exact or (self.picture.final and not answer.final)):
-            return
-        if self.newest is not None and not exact:
-            distance = math.dist(_viewpoint_of(self.newest), here)
-            if math.dist(_viewpoint_of(answer), here) > distance + _FARTHER:
-                return
-        if self.newest is not None and self.share < 1.0:
-            self._next = answer
-            return
-        same = self.picture is not None and self.picture.final  # as on screen, but now with its score
-        if not same and not self._follows_seamlessly(answer):
-            self._fade_from = self._now
-            self._fade_seconds = FADE_SECONDS if self._resting else STREAM_FADE_SECONDS
-        self.newest = answer
-        if self._span is None and answer.percentiles is not None:
-            self._span = disparity_range(answer.percentiles, _SPAN_TAIL)
-        if exact:
-            self.picture = answer
-
-    def _follows_seamlessly(self, answer: Answer) -> bool:
-        """Whether the answer can take the place of what is on screen without a fade: one quick synthesis after another,
-        carried a short way, differ by less than can be seen (docs/speed.md), and a fade would only cost time."""
-        newest = self.newest
-        if newest is None or not newest.step is answer.step is Step.REALTIME:
-            return False
-        return math.dist(_viewpoint_of(newest), _viewpoint_of(answer)) <= SEAMLESS
 
     def _follow(self, light_field: LightField) -> None:
         """The viewpoint has moved."""
@@ -516,13 +482,9 @@ class Controller:
 
     def _look_up(self, light_field: LightField) -> None:
         """A viewpoint seen before is on screen at once, without a fade."""
-        self.picture = self._engine.cached(light_field, *self.viewpoint)
-        if self.picture is not None:
-            self.newest, self._next = self.picture, None
-            self._fade_from = -math.inf
-            self._hits += 1
-        elif self.newest is not None and _viewpoint_of(self.newest) == self.viewpoint:
-            self.picture = self.newest
+        known = self._engine.cached(light_field, *self.viewpoint)
+        self._screen.move(self.viewpoint, known)
+        self._hits += known is not None
 
     def _wanted(self, light_field: LightField) -> Wish | None:
         here, picture = self.viewpoint, self.picture
@@ -548,8 +510,7 @@ class Controller:
         if state.comparison.rule != self._engine.rule:
             self._engine.rule = state.comparison.rule
             self._count(light_field)
-            if self.picture is not None:
-                self.picture = replace(self.picture, score=self._engine.scores(light_field).get(rounded(*self.viewpoint)))
+            self._screen.score(self._engine.scores(light_field).get(rounded(*self.viewpoint)))
         self.comparing.follow(light_field, self.viewpoint, state.comparison)
         self.comparing.measure(light_field, self.picture, state.comparison, state.look is Look.ERROR)
 
@@ -569,7 +530,7 @@ class Controller:
 
     def _samples(self) -> Samples | None:
         """The values behind the picture, where it has been made for exactly the viewpoint."""
-        if self.light_field is None or self.picture is None or _viewpoint_of(self.picture) != self.viewpoint:
+        if self.light_field is None or self.picture is None or viewpoint_of(self.picture) != self.viewpoint:
             return None
         source = self.state.comparison.source
         partner = self.comparing.answer if source is Source.MODEL else None
@@ -656,7 +617,3 @@ def _at_cursor(values: npt.NDArray[np.generic] | None, cursor: Point | None) -> 
     if not (0 <= y < values.shape[0] and 0 <= x < values.shape[1]):
         return None
     return float(values[y, x])
-
-
-def _viewpoint_of(answer: Answer) -> Point:
-    return answer.synthesis.u, answer.synthesis.v

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
-from app.controller import FADE_SECONDS, MAGNET_RADIUS, REST_SECONDS, STREAM_FADE_SECONDS, Controller
+from app.controller import MAGNET_RADIUS, REST_SECONDS, Controller
 from app.engine import Engine, disparity_range
+from app.on_screen import FADE_SECONDS, STREAM_FADE_SECONDS
 from app.state import Look, Step
 from app.worker import Cancel
 from lfcore.errors import InputError, WeightsError
