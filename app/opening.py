@@ -85,7 +85,7 @@ SHIPPED = ("full", "realtime", "planesweep", "mean")  # lfcore.synthesizer.MODEL
 
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
 # It sleeps for a part of every sixtieth of a second, which is then theirs, so this takes nothing from them.
-PROCESS_NICENESS = 5
+PROCESS_NICENESS = 10
 
 
 def synthesis_process() -> SynthesisProcess:
