@@ -78,7 +78,7 @@ class MeanSynthesizer:
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
 
 
-MODEL_NAMES = ("full", "realtime", "planesweep", "mean")
+MODEL_NAMES = ("full", "realtime", "single", "planesweep", "mean")
 
 
 def make_synthesizer(model: str | Path = "full") -> Synthesizer:

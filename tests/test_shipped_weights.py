@@ -18,7 +18,7 @@ from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
 
 BUTTERCUP = Path(__file__).parents[2] / "shared" / "data" / "val" / "Buttercup"
-SHIPPED = ("full", "realtime")
+SHIPPED = ("full", "realtime", "single")
 SCENES = [
     sample_path(),
     pytest.param(
