@@ -17,9 +17,9 @@ from app.engine import Engine
 from app.exhibits import Exhibit, Exhibition, exhibition, open_exhibition
 from app.geometry import Zoom, place
 from app.layout import lay_out
+from app.looking import Looking
 from app.opening import open_by_content
 from app.readout import Caption, Readout
-from app.looking import Looking
 from app.state import Grid
 from app.worker import Cancel
 from lfcore import colormaps
