@@ -96,7 +96,7 @@ def _table(readout: Readout) -> None:
     hint = "Computed when the hand rests" if readout.compared.table else "No captured view at this viewpoint"
     table = readout.compared.table or tuple((name, None) for name in readout.models)
     best = max((score.psnr for _, score in table if score is not None), default=None)
-    imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 1))
+    imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 0))
     if imgui.begin_table("models", 3):
         imgui.table_setup_column("model", imgui.TableColumnFlags_.width_stretch.value, 1.3)
         for name, score in table:

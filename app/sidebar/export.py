@@ -56,14 +56,16 @@ def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
     choices.shape = choice("Shape", choices.shape, SHAPES, "The way of the viewpoint, at even speed")
     if choices.shape == KEY_FRAMES:
         count = len(choices.key_frames)
-        width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+        width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
         button(f"Add ({count})", "add key frame", context, width)
         imgui.same_line()
         imgui.begin_disabled(not count)
         button("Remove", "remove key frame", context, width)
         imgui.end_disabled()
-        _, choices.closed = imgui.checkbox("Back to the first", choices.closed)
-        tooltip("The path closes, so that a video can be looped. In the pad, a right click adds or removes a key frame.")
+        imgui.same_line()
+        _, choices.closed = imgui.checkbox("Closed", choices.closed)
+        hint = "The path goes back to its first key frame, so that a video can be looped. "
+        tooltip(f"{hint}In the pad, a right click adds or removes a key frame.")
     else:
         hint = "Reach from the middle view; 0.5 is the edge of the corner views"
         choices.radius = slider("Reach", choices.radius, RADIUS_LIMITS, number(choices.radius, 2), hint)

@@ -46,7 +46,7 @@ def is_novel(grid: Grid, index: int) -> bool:
 
 def draw(context: Context, readout: Readout, grid: Grid, total: Summary) -> None:
     """The grid, and beside it what it comes to."""
-    _cells(context, readout, grid, total, round(0.42 * imgui.get_content_region_avail().x))
+    _cells(context, readout, grid, total, round(0.38 * imgui.get_content_region_avail().x))
     imgui.same_line()
     imgui.begin_group()
     rows = [("mean", total.mean), ("least", total.least), ("greatest", total.greatest)]
