@@ -20,6 +20,14 @@ from lfcore.sweep_target import Kind, Target, check_fits
 KEY_FRAMES = "key frames"
 SHAPES = (*PATHS, KEY_FRAMES)
 RADIUS_LIMITS = (0.05, 0.5)
+SIZES = {"25 %": 0.25, "50 %": 0.5, "100 %": 1.0, "150 %": 1.5, "200 %": 2.0, "300 %": 3.0}
+LAYERS = {
+    "Image": Layer.IMAGE,
+    "Disparity": Layer.DISPARITY,
+    "Error": Layer.ERROR,
+    "Image | captured": Layer.BESIDE_CAPTURED,
+    "Image | disparity": Layer.BESIDE_DISPARITY,
+}
 _DRAWN_STOPS = 160  # of the line on the pad
 # A key frame is met by a click this near to it, in baselines.
 _REACH = 0.06
@@ -90,6 +98,7 @@ class ExportChoices:
     playing: bool = False
     started: float | None = None  # when the preview began
     placed: tuple[float, float] | None = None  # where it has put the viewpoint
+    typing: str = ""  # the field of the tab that takes the keyboard in the next frame
     seen_exports: int = 0  # number of the newest export that has been brought into sight
 
     def path(self) -> ViewPath:

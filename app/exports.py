@@ -71,6 +71,9 @@ class Exports:
         """Do what was asked for, but saving a picture. Raises LfviewError where it is impossible as chosen."""
         if isinstance(request, CancelExport):
             self._queue.cancel(request.number)
+        elif request is ExportAction.CANCEL_ALL:
+            for status in self.statuses:
+                self._queue.cancel(status.number)
         elif request is ExportAction.CLEAR:
             self._queue.clear()
         elif request is ExportAction.CHOOSE_FOLDER:

@@ -13,11 +13,12 @@ from app import dialogs
 from app.controller import Controller
 from app.dialogs import Answered, Purpose, Question
 from app.engine import Engine, ModelChoice
-from app.export_choices import KEY_FRAMES, Product
+from app.export_choices import KEY_FRAMES, Format, Product
 from app.export_requests import CancelExport, ExportAction
 from app.exporting import Phase, Status
 from app.sidebar.export import progress_words
 from app.state import Look, Tab
+from app.tone import Curve
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
 from lfcore.sweep_plan import ShapePath, SweepPlan, load_plan, save_plan
@@ -51,6 +52,43 @@ def test_keys_add_and_remove_key_frames_and_play(screen: Screen) -> None:
     assert not screen.state.swaying
     screen.press("Ctrl+Shift+K")
     assert not export.playing
+
+
+def palette(screen: Screen, words: str) -> None:
+    """Run the first command that the palette finds for these words."""
+    screen.press("Ctrl+P")
+    screen.frame(3)
+    screen.io.add_input_characters_utf8(words)
+    screen.frame(3)
+    screen.press("Enter")
+    screen.frame(3)
+
+
+def test_the_palette_reaches_what_has_no_key(screen: Screen) -> None:
+    export = screen.state.export
+    screen.press("Ctrl+1")
+    palette(screen, "export as webm")
+    assert export.format is Format.WEBM
+    assert screen.state.tab is Tab.EXPORT  # where it is seen
+    palette(screen, "export quilt")
+    assert export.product is Product.QUILT
+    palette(screen, "path of the export spiral")
+    assert export.shape == "spiral"
+    before = export.radius
+    palette(screen, "narrower path")
+    assert export.radius < before
+    palette(screen, "labels on exported")
+    assert export.labels
+    palette(screen, "scores by 7x7")
+    assert screen.state.comparison.rule == "7x7-Y"
+    palette(screen, "larger gamma")
+    assert screen.state.looking.tone.curve is Curve.GAMMA
+    assert screen.state.looking.tone.gamma == pytest.approx(2.3)
+    palette(screen, "type the name")
+    screen.frame(3)
+    screen.io.add_input_characters_utf8("walk")
+    screen.frame(3)
+    assert export.name.endswith("walk")
 
 
 def test_key_frames_take_the_focus_of_a_refocused_picture(screen: Screen) -> None:

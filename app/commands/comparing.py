@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from app.commands.kinds import COMPARING, Command, Context, Run, toggle
 from app.comparison import WIPE_STEP, Arrangement, Difference, partners
+from app.scoring import RULES
 from app.state import Look, Tab
 
 
@@ -59,6 +60,14 @@ def _score_all(context: Context) -> None:
         state.tab, state.panel = Tab.COMPARE, True
 
 
+def _rule(rule: str) -> Run:
+    def run(context: Context) -> None:
+        context.state.comparison = replace(context.state.comparison, rule=rule)
+        context.state.tab, context.state.panel = Tab.COMPARE, True
+
+    return run
+
+
 COMMANDS: dict[str, Command] = {
     "flip": Command(
         ("R",), "Hold to see the partner in place of the picture", COMPARING, toggle("flipped"), released=_flip_back
@@ -75,4 +84,5 @@ COMMANDS: dict[str, Command] = {
         ("E",), "The difference from the partner; again: absolute, signed, squared, ...", COMPARING, _next_difference
     ),
     "score all": Command(("H",), "Score all captured views while the hand rests, or not", COMPARING, _score_all),
+    **{f"scores by {rule}": Command((), f"Scores by {rule}", COMPARING, _rule(rule)) for rule in RULES},
 }

@@ -8,7 +8,7 @@ from dataclasses import replace
 from app.commands.kinds import TONES, Command, Context, Needs, Run
 from app.looking import Looking
 from app.state import Look
-from app.tone import STOPS_STEP
+from app.tone import STOPS_STEP, Curve
 
 
 def _changed(change: Callable[[Looking], Looking]) -> Run:
@@ -20,6 +20,15 @@ def _changed(change: Callable[[Looking], Looking]) -> Run:
 
 def _exposed(stops: float) -> Run:
     return _changed(lambda looking: replace(looking, tone=looking.tone.exposed(stops)))
+
+
+def _gamma(step: float) -> Run:
+    """A larger or smaller gamma, which is then the curve."""
+    return _changed(
+        lambda looking: replace(
+            looking, tone=replace(looking.tone, curve=Curve.GAMMA, gamma=looking.tone.gamma + step).bounded()
+        )
+    )
 
 
 def _contrast(factor: float) -> Run:
@@ -53,4 +62,6 @@ COMMANDS: dict[str, Command] = {
     "hand range": Command(("Shift+L",), "Range of the disparity by hand, or by percentiles", TONES, _range_by_hand),
     "less contrast": Command((",",), "Less gain, or a wider range of the disparity", TONES, _contrast(0.5)),
     "more contrast": Command((".",), "More gain, or a narrower range of the disparity", TONES, _contrast(2.0)),
+    "larger gamma": Command((), "A larger gamma", TONES, _gamma(0.1)),
+    "smaller gamma": Command((), "A smaller gamma", TONES, _gamma(-0.1)),
 }

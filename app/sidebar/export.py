@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app import theme
 from app.commands import Context
-from app.export_choices import KEY_FRAMES, RADIUS_LIMITS, SHAPES, ExportChoices, Format, Product
+from app.export_choices import KEY_FRAMES, LAYERS, RADIUS_LIMITS, SHAPES, SIZES, ExportChoices, Format, Product
 from app.export_requests import CancelExport, ExportAction
 from app.exporting import Phase, Status
 from app.progress import clock
@@ -23,14 +23,6 @@ from lfcore.sweep_plan import GAIN_LIMITS, MAX_FPS, MAX_PLAYS, Layer
 _Chosen = TypeVar("_Chosen", bound=Enum)
 
 _LABEL = 4.5  # em, as in app.widgets
-_SIZES = {"25 %": 0.25, "50 %": 0.5, "100 %": 1.0, "150 %": 1.5, "200 %": 2.0, "300 %": 3.0}
-_LAYERS = {
-    "Image": Layer.IMAGE,
-    "Disparity": Layer.DISPARITY,
-    "Error": Layer.ERROR,
-    "Image | captured": Layer.BESIDE_CAPTURED,
-    "Image | disparity": Layer.BESIDE_DISPARITY,
-}
 _LEAST_FPS = 0.1
 _MOST_FRAMES = 9_999  # that can be typed; a file may say more
 _ESLF_SIDE = 14  # views that an ESLF holds along each side
@@ -118,16 +110,16 @@ def _focus(choices: ExportChoices) -> None:
 
 
 def _frames(choices: ExportChoices) -> None:
-    layers = {layer: name for name, layer in _LAYERS.items()}
+    layers = {layer: name for name, layer in LAYERS.items()}
     hint = "What the frames show. Errors are shown at captured views only."
-    choices.layer = _LAYERS[choice("Show", layers[choices.layer], tuple(_LAYERS), hint)]
+    choices.layer = LAYERS[choice("Show", layers[choices.layer], tuple(LAYERS), hint)]
     if choices.layer is Layer.ERROR:
         logarithmic = imgui.SliderFlags_.logarithmic.value
         hint = "The colours end at white divided by this."
         choices.gain = slider("Gain", choices.gain, GAIN_LIMITS, f"× {choices.gain:.1f}", hint, logarithmic)
-    sizes = {f"{100 * choices.scale:.4g} %": choices.scale, **_SIZES}
+    sizes = {f"{100 * choices.scale:.4g} %": choices.scale, **SIZES}
     shown = next(name for name, scale in sizes.items() if scale == choices.scale)
-    choices.scale = sizes[choice("Size", shown, tuple(dict.fromkeys((*_SIZES, shown))), "Of the views' own size")]
+    choices.scale = sizes[choice("Size", shown, tuple(dict.fromkeys((*SIZES, shown))), "Of the views' own size")]
     _, choices.labels = imgui.checkbox("Labels", choices.labels)
     tooltip("Captions with (u, v), and the scales of colours")
     imgui.same_line(0, em() * 0.9)
@@ -170,6 +162,7 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
     model = choice("Model", choices.model or _SAME_MODEL, models, "The model that makes the views; realtime is the fastest")
     choices.model = "" if model == _SAME_MODEL else model
     _folder(context, choices)
+    _take_keyboard(choices, "Name")
     choices.name = _typed("Name", choices.name, "The file's name, without the ending of its kind")
     fault = choices.fault
     imgui.begin_disabled(bool(fault))
@@ -187,6 +180,7 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
 def _folder(context: Context, choices: ExportChoices) -> None:
     ask = "\N{HORIZONTAL ELLIPSIS}"
     room = imgui.calc_text_size(ask).x + 2 * imgui.get_style().frame_padding.x + imgui.get_style().item_spacing.x
+    _take_keyboard(choices, "Folder")
     _labelled("Folder", room)
     _, choices.folder = imgui.input_text("##Folder", choices.folder)
     tooltip("Where it is written")
@@ -194,6 +188,13 @@ def _folder(context: Context, choices: ExportChoices) -> None:
     if imgui.button(f"{ask}##folder"):
         context.requests.append(ExportAction.CHOOSE_FOLDER)
     tooltip("Choose the folder")
+
+
+def _take_keyboard(choices: ExportChoices, field: str) -> None:
+    """The next field, of that name, takes the keyboard if a command has asked for it."""
+    if choices.typing == field:
+        imgui.set_keyboard_focus_here()
+        choices.typing = ""
 
 
 def _queue(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
