@@ -179,7 +179,7 @@ def test_a_click_in_the_map_of_scores_goes_to_the_view(screen: Screen) -> None:
     x, y = screen.find_in_panel(gone_to_a_view, "left")
     here = GRID.at(screen.state.u, screen.state.v)
     assert here is not None and here < 8  # the first row met from above
-    screen.click(x, y + 100)  # within the map, farther down
+    screen.click(x, y + 60)  # within the map, farther down
     below = GRID.at(screen.state.u, screen.state.v)
     assert below is not None and below % 8 == here % 8 and below > here + 8
 
