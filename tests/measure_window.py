@@ -1,0 +1,121 @@
+"""What the window costs while a person uses it, on a virtual screen with Mesa's software renderer.
+
+`python -m tests.measure_window LIGHT_FIELD ANOTHER` (folders of views): seconds from start to the first picture and to the
+finished one that lies on disk, then the times of frames while another light field is opened, the cache fills, and a sweep
+is exported.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from tests.virtual_screen import VirtualScreen, virtual_screen, wait_until
+
+STARTS = 4
+TOO_LONG = 0.05  # s, of a frame
+PICTURE = (slice(100, 600), slice(100, 800))  # rows and columns of the screen that lie on the picture
+DOT = (784, slice(12, 22))  # of the step in the status line
+COLOUR_OF_FULL = (108, 182, 232)
+
+# The program, which writes when each frame ended and how long it took.
+PROGRAM = """
+import sys, time
+from pathlib import Path
+import app.viewer
+draw = app.viewer._Window.draw
+frames = open(sys.argv[2], "w", buffering=1)
+def timed(window):
+    start = time.monotonic()
+    draw(window)
+    print(time.monotonic(), time.monotonic() - start, file=frames)
+app.viewer._Window.draw = timed
+if __name__ == "__main__":
+    app.viewer.run_viewer(Path(sys.argv[1]))
+"""
+
+
+def _has_picture(screen: VirtualScreen) -> bool:
+    return bool(screen.pixels()[PICTURE].std() > 20)
+
+
+def _is_full(screen: VirtualScreen) -> bool:
+    return bool((np.abs(screen.pixels()[DOT].astype(int) - COLOUR_OF_FULL).sum(-1) < 10).any())
+
+
+def _seconds_until(condition: Callable[[], bool], start: float) -> float:
+    wait_until(condition, "the picture")
+    return time.monotonic() - start
+
+
+def measure_start(screen: VirtualScreen, path: Path, frames: Path) -> None:
+    """The first start fills the cache on disk, the others find it there."""
+    for number in range(STARTS):
+        start = time.monotonic()
+        with screen.program(PROGRAM, str(path), str(frames)):
+            first = _seconds_until(lambda: _has_picture(screen), start)
+            finished = _seconds_until(lambda: _is_full(screen), start)
+            print(f"start {number + 1}: first picture after {first:.2f} s, that of full after {finished:.2f} s")
+            time.sleep(3)
+
+
+def measure_frames(screen: VirtualScreen, path: Path, another: Path, frames: Path, folder: Path) -> None:
+    """Times of frames in each part of a use. The export goes beside the second light field, so that is copied first."""
+    copy = folder / "another"
+    shutil.copytree(another, copy)
+    marks: list[tuple[str, float]] = []
+
+    def mark(name: str, seconds: float) -> None:
+        marks.append((name, time.monotonic()))
+        time.sleep(seconds)
+
+    with screen.program(PROGRAM, str(path), str(frames)) as program:
+        mark("start", 8)
+        mark("filling the cache", 12)
+        marks.append(("opening", time.monotonic()))
+        screen.xdotool("mousemove", 400, 300, "key", "ctrl+shift+o")
+        time.sleep(1)
+        screen.xdotool("type", "--delay", 20, str(copy))
+        screen.xdotool("key", "Return")
+        time.sleep(8)
+        screen.xdotool("key", "m")  # realtime comes after full
+        time.sleep(2)
+        screen.xdotool("key", "ctrl+shift+e")
+        marks.append(("exporting", time.monotonic()))
+        start = time.monotonic()
+        wait_until((folder / f"{copy.name} sweep.mp4").is_file, "the export")
+        print(f"export of 120 views by realtime: {time.monotonic() - start:.1f} s")
+        mark("end", 0)
+        screen.xdotool("key", "ctrl+q")
+        program.wait(30)
+    times = np.loadtxt(frames)  # (N, 2)
+    for (name, begin), (_, end) in itertools.pairwise(marks):
+        of_part = 1e3 * times[(times[:, 0] >= begin) & (times[:, 0] < end), 1]
+        middle, most, longest = np.percentile(of_part, (50, 95, 100))
+        over = int((of_part > 1e3 * TOO_LONG).sum())
+        print(f"{name}: {len(of_part)} frames, p50 {middle:.1f}, p95 {most:.1f}, longest {longest:.1f} ms, {over} over 50 ms")
+
+
+def main() -> None:
+    """See the module."""
+    path, another = (Path(each).resolve() for each in sys.argv[1:3])
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME"):
+            os.environ[name] = str(folder / name)
+        (folder / "screen").mkdir()
+        with virtual_screen(folder / "screen") as screen:
+            measure_start(screen, path, folder / "frames")
+            measure_frames(screen, path, another, folder / "frames", folder)
+
+
+if __name__ == "__main__":
+    main()
