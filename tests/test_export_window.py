@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,7 @@ from lfcore.sweep_frames import SweepFrames, remembering
 from lfcore.sweep_plan import KeyFramePath, load_plan
 from lfcore.sweep_target import Kind, Target
 from tests.moving_scene import TruthSynthesizer, light_field, truth
-from tests.virtual_screen import VirtualScreen, missing_tools, virtual_screen, wait_until
+from tests.virtual_screen import VirtualScreen, wait_until
 
 VIEW = (120, 160)
 
@@ -34,16 +32,6 @@ show(Path(sys.argv[1]), Engine(TruthSynthesizer, 2**26, name="truth"), "truth", 
 """
 
 SLOW_PROGRAM = PROGRAM.replace("(TruthSynthesizer, False)", "(lambda: TruthSynthesizer(0.3), False)")
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 def test_key_frames_are_set_played_saved_and_exported(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +15,7 @@ from lfcore.lightfield import FloatArray, LightField
 from lfcore.refocus import aperture_weights, refocus
 from tests.plane_synthesizer import DISPARITY, view
 from tests.scenes import plane
-from tests.virtual_screen import SIZE, VirtualScreen, missing_tools, virtual_screen, wait_until
+from tests.virtual_screen import SIZE, VirtualScreen, wait_until
 
 VIEW = (120, 160)
 MARGIN = 9  # what some views do not see
@@ -34,16 +32,6 @@ from app.viewer import show
 from tests.plane_synthesizer import PlaneSynthesizer
 show(Path(sys.argv[1]), Engine(PlaneSynthesizer, 2**26), "truth")
 """
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 def shown(screen: VirtualScreen, area: Rect, size: tuple[int, int] = (VIEW[1], VIEW[0])) -> FloatArray:

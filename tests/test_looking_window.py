@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 from moving_scene import DISPARITY, light_field, truth
 from test_whole_program import BESIDE, EXACT, INSIDE, PROGRAM, VIEW, save, shown, shows
-from virtual_screen import VirtualScreen, missing_tools, virtual_screen, wait_until
+from virtual_screen import VirtualScreen, wait_until
 
 from app.looking import LEVEL_STEP
 from app.tone import Curve, Tone, toned
 from lfcore import colormaps
 from lfcore.colormaps import ColourMap
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 def test_tones_insides_sway_and_the_inspector(screen: VirtualScreen, tmp_path: Path) -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 from moving_scene import light_field, truth
 from test_whole_program import BESIDE, EXACT, INSIDE, VIEW, save, shown, shows
-from virtual_screen import VirtualScreen, missing_tools, virtual_screen, wait_until
+from virtual_screen import VirtualScreen, wait_until
 
 from app.settings import Settings, SettingsFile, Theme
 from lfcore import colormaps
@@ -32,16 +29,6 @@ path = Path(sys.argv[2]) if len(sys.argv) > 2 else None
 show(path, Engine(lambda: TruthSynthesizer(0.1), 2**26), "truth", keeping=keeping)
 """
 MIDDLE = colormaps.disparity_colours()[127:129].mean(0) / 255  # one disparity everywhere takes the colour in the middle
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 def settings_of(kept: Path) -> Settings:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 from moving_scene import light_field, truth
-from virtual_screen import SIZE, VirtualScreen, missing_tools, virtual_screen, wait_until
+from virtual_screen import SIZE, VirtualScreen, wait_until
 
 from app.comparison import Arrangement, Comparison
 from app.geometry import Rect, Zoom
@@ -41,16 +38,6 @@ class Bright(TruthSynthesizer):
 models = {{"bright": ModelChoice(Bright, False), "truth": ModelChoice(TruthSynthesizer, False)}}
 show(Path(sys.argv[1]), Engine(Bright, 2**26, name="bright"), "bright", models=models)
 """
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 def seen(screen: VirtualScreen, pane: Pane, part: Rect) -> tuple[FloatArray, FloatArray]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
 from moving_scene import DISPARITY, light_field, truth
-from virtual_screen import SIZE, VirtualScreen, missing_tools, virtual_screen, wait_until
+from virtual_screen import SIZE, VirtualScreen, wait_until
 
 from app.geometry import Zoom, place
 from app.layout import lay_out
@@ -35,16 +34,6 @@ from app.viewer import show
 from tests.moving_scene import TruthSynthesizer
 show(Path(sys.argv[1]), Engine(lambda: TruthSynthesizer(0.5), 2**26), "truth")
 """
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 @pytest.fixture(scope="module")

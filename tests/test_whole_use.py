@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import av
 import numpy as np
-import pytest
 from moving_scene import light_field, truth
-from virtual_screen import VirtualScreen, missing_tools, virtual_screen, wait_until
+from virtual_screen import VirtualScreen, wait_until
 
 from tests.test_whole_program import BESIDE, EXACT, VIEW, save, shown, shows
 
@@ -27,16 +24,6 @@ from tests.moving_scene import TruthSynthesizer
 make = lambda: TruthSynthesizer(0.02)
 show(None, Engine(make, 2**26, name="truth"), "truth", models={"truth": ModelChoice(make, False)})
 """
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
-    with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
-        yield made
 
 
 def test_open_drag_look_wipe_refocus_export_close(screen: VirtualScreen, tmp_path: Path) -> None:
