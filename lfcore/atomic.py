@@ -6,6 +6,7 @@ import contextlib
 import os
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from lfcore.errors import OutputError
@@ -43,6 +44,7 @@ def _output_error(target: Path, error: OSError) -> OutputError:
     return OutputError(f"Cannot write {target}: {reason}; choose another place or make room there.")
 
 
+@cache  # it can only be read by setting it, which other threads must not see time and again
 def _umask() -> int:
     value = os.umask(0)
     os.umask(value)

@@ -6,11 +6,13 @@ import contextlib
 import hashlib
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
+
+from lfcore.errors import OutputError
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,25 @@ def entries(folder: Path) -> Iterator[KeptFile]:
             with contextlib.suppress(OSError):
                 facts = entry.stat(follow_symlinks=False)
                 yield KeptFile(Path(entry.path), facts.st_size, facts.st_mtime)
+
+
+def make_private(folder: Path) -> None:
+    """Make the folder of a store, for its owner alone: pictures are nobody else's business. Raises OutputError."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot make the folder {folder}: {error.strerror or error}.") from error
+
+
+def make_room(files: Iterable[KeptFile], wanted: int, limit: int) -> None:
+    """Remove those used longest ago, until `wanted` more bytes stay within the limit."""
+    oldest_first = sorted(files, key=lambda file: file.used_at)
+    excess = sum(file.size for file in oldest_first) + wanted - limit
+    for file in oldest_first:
+        if excess <= 0:
+            return
+        remove(file.path)
+        excess -= file.size
 
 
 def mark_used(path: Path) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 from lfcore.atomic import atomic_path
 from lfcore.cache import CacheKey
 from lfcore.errors import OutputError
-from lfcore.kept_files import KeptFile, code_digest, entries, mark_used, remove
+from lfcore.kept_files import KeptFile, code_digest, entries, make_room, mark_used, remove
 from lfcore.synthesis import Synthesis
 
 DEFAULT_LIMIT = 2**30
@@ -81,7 +81,8 @@ class ViewStore:
         data = _packed(synthesis)
         if len(data) > self.limit_bytes:
             return
-        self._make_room(len(data))
+        held = (file for folder in self._folders() for file in _files(folder))
+        make_room(held, len(data), self.limit_bytes)
         path = self._path(key)
         for attempt in range(_ATTEMPTS):
             try:
@@ -89,7 +90,8 @@ class ViewStore:
                 return
             except OutputError as error:
                 # A program that tidies or clears may just have removed the folder, and another have made it again.
-                if not isinstance(error.__cause__, FileNotFoundError) or attempt == _ATTEMPTS - 1:
+                passing = isinstance(error.__cause__, FileNotFoundError | FileExistsError)
+                if not passing or attempt == _ATTEMPTS - 1:
                     raise
 
     def _write(self, path: Path, data: bytes) -> None:
@@ -128,15 +130,6 @@ class ViewStore:
                 folder.rmdir()
         if stuck:
             raise OutputError(f"Cannot remove {stuck} files below {self.root}; look whether they are yours to remove.")
-
-    def _make_room(self, wanted: int) -> None:
-        files = sorted((file for folder in self._folders() for file in _files(folder)), key=lambda file: file.used_at)
-        excess = sum(file.size for file in files) + wanted - self.limit_bytes
-        for file in files:
-            if excess <= 0:
-                return
-            remove(file.path)
-            excess -= file.size
 
     def _folders(self) -> Iterator[Path]:
         """The folders of views; others are left alone."""

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from lfcore.atomic import atomic_path
-from lfcore.errors import InputError, OutputError
+from lfcore.errors import InputError
 from lfcore.formats.glance import LONGEST_SIDE, Glance
-from lfcore.kept_files import KeptFile, code_digest, default_root, entries, mark_used, remove
+from lfcore.kept_files import KeptFile, code_digest, default_root, entries, make_private, make_room, mark_used, remove
 
 DEFAULT_LIMIT = 64 * 2**20
 _FOLDER = "thumbnails"
@@ -54,11 +54,8 @@ class ThumbnailStore:
     def put(self, key: str, seen: Glance) -> None:
         """Keep this glance, and remove those used longest ago where there would be too many. Raises OutputError."""
         data = _packed(seen)
-        self._make_room(len(data))
-        try:
-            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # pictures are nobody else's business
-        except OSError as error:
-            raise OutputError(f"Cannot make the folder {self.folder}: {error.strerror or error}.") from error
+        make_room(self._files(), len(data), self.limit_bytes)
+        make_private(self.folder)
         with atomic_path(self._path(key)) as temporary:
             temporary.write_bytes(data)
 
@@ -71,15 +68,6 @@ class ThumbnailStore:
         """Remove all of them."""
         for file in self._files():
             remove(file.path)
-
-    def _make_room(self, wanted: int) -> None:
-        files = sorted(self._files(), key=lambda file: file.used_at)
-        excess = sum(file.size for file in files) + wanted - self.limit_bytes
-        for file in files:
-            if excess <= 0:
-                return
-            remove(file.path)
-            excess -= file.size
 
     def _files(self) -> list[KeptFile]:
         return [file for file in entries(self.folder) if file.path.name.endswith(_SUFFIX)]

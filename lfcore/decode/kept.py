@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lfcore.atomic import atomic_path
-from lfcore.errors import OutputError
-from lfcore.kept_files import KeptFile, code_digest, default_root, entries, mark_used, remove
+from lfcore.kept_files import KeptFile, code_digest, default_root, entries, make_private, make_room, mark_used, remove
 from lfcore.lightfield import LightField
 
 DEFAULT_LIMIT = 2**30
@@ -62,10 +61,7 @@ class DecodedStore:
         if size > self.limit_bytes:
             return
         self._make_room(size)
-        try:
-            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # pictures are nobody else's business
-        except OSError as error:
-            raise OutputError(f"Cannot make the folder {self.folder}: {error.strerror or error}.") from error
+        make_private(self.folder)
         with atomic_path(self._path(key)) as temporary, temporary.open("wb") as file:
             start = _MAGIC + len(header).to_bytes(4, "little") + header
             views = np.ascontiguousarray(light_field.views)
@@ -84,13 +80,10 @@ class DecodedStore:
             remove(file.path)
 
     def _make_room(self, wanted: int) -> None:
-        files = sorted(self._files(), key=lambda file: file.used_at)
-        excess = sum(file.size for file in files) + wanted - self.limit_bytes
-        for file in files:
-            abandoned = file.path.name.startswith(".") and time.time() - file.used_at > _LEFTOVER_SECONDS
-            if excess > 0 or abandoned:
-                remove(file.path)
-                excess -= file.size
+        for file in self._files():
+            if file.path.name.startswith(".") and time.time() - file.used_at > _LEFTOVER_SECONDS:
+                remove(file.path)  # begun by a program that did not end it
+        make_room(self._files(), wanted, self.limit_bytes)
 
     def _files(self) -> list[KeptFile]:
         return [file for file in entries(self.folder) if file.path.name.endswith(_SUFFIX)]
