@@ -200,7 +200,8 @@ class ExportChoices:
     def suggest(self, opened: str, name: str) -> None:
         """A place for exports of what was opened there: beside it, or at home where nothing should be written there."""
         source = Path(opened).absolute()
-        beside = os.access(source.parent, os.W_OK) and source != sample_path()
+        effective = os.access in os.supports_effective_ids
+        beside = os.access(source.parent, os.W_OK, effective_ids=effective) and source != sample_path()
         self.folder = str(source.parent if beside else Path.home())
         self.name = f"{name} sweep"
         self.playing = False

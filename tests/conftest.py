@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from virtual_screen import VirtualScreen, missing_tools, virtual_screen
+from virtual_screen import VirtualScreen, require_tools, virtual_screen
 
 # A software context, so that the tests see the same pictures on every machine.
 os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
@@ -30,10 +30,7 @@ def gl() -> Any:
 @pytest.fixture(scope="module")
 def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VirtualScreen]:
     """A virtual screen for whole-program tests, one for each file of tests; skipped where there are no tools for it."""
-    if missing_tools():
-        if os.environ.get("CI"):
-            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
-        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
+    require_tools()
     with virtual_screen(tmp_path_factory.mktemp("screen")) as made:
         yield made
 

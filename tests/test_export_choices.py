@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
+from privileges import without_privileges
 
 from app.export_choices import KEY_FRAMES, ExportChoices, Format, Product, drawn_path
 from app.export_jobs import Source, chosen_job
@@ -107,13 +109,20 @@ def test_formats_know_their_kind() -> None:
     assert [Format.PNG.kind, Format.EXR.kind] == [Kind.PNG, Kind.EXR]
 
 
-@pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write anywhere")
-def test_exports_go_home_where_the_folder_is_read_only(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="Windows has no such permissions")
+def test_exports_go_home_where_the_folder_is_read_only() -> None:
     choices = ExportChoices()
-    choices.suggest(str(tmp_path / "rock.png"), "rock")
-    tmp_path.chmod(0o700)
-    assert choices.folder == str(Path.home())
+    with tempfile.TemporaryDirectory() as folder:  # tmp_path lies in a folder that others may not enter at all
+        capture = str(Path(folder) / "rock.png")
+        Path(folder).chmod(0o777)
+        with without_privileges():
+            choices.suggest(capture, "rock")
+        assert choices.folder == folder
+        Path(folder).chmod(0o555)
+        with without_privileges():
+            choices.suggest(capture, "rock")
+        assert choices.folder == str(Path.home())
+        Path(folder).chmod(0o700)
 
 
 def test_exports_go_beside_the_light_field(tmp_path: Path) -> None:

@@ -9,13 +9,13 @@ import struct
 import sys
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from privileges import without_privileges
 
 from lfcore.errors import Cancelled, InputError
 from lfcore.formats import describe, images, open_light_field
@@ -349,19 +349,6 @@ def test_missing_paths_and_things_that_are_no_light_field(tmp_path: Path) -> Non
     assert "not a readable picture" in refusal(tmp_path / "text.png")
     os.mkfifo(tmp_path / "pipe.png")
     assert "neither a file nor a folder" in refusal(tmp_path / "pipe.png")
-
-
-@contextmanager
-def without_privileges() -> Iterator[None]:
-    """Root may read everything, so it becomes the user with the least rights for a while; others stay who they are."""
-    root = os.geteuid() == 0
-    if root:
-        os.seteuid(65534)
-    try:
-        yield
-    finally:
-        if root:
-            os.seteuid(0)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="Windows has no such permissions")

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 SIZE = (1280, 800)
 PATIENCE = 60.0
@@ -24,6 +25,14 @@ _HEADER_WORDS = 25  # of an XWD file, big-endian
 def missing_tools() -> list[str]:
     """The programs that these tests need and that are not installed."""
     return [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
+
+
+def require_tools() -> None:
+    """Skip the test where these programs are missing; in CI, whose set-up installs them, fail."""
+    if missing_tools():
+        if os.environ.get("CI"):
+            pytest.fail(f"the set-up should have installed {', '.join(missing_tools())}")
+        pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
 
 
 def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
