@@ -12,7 +12,7 @@ class ExportAction(Enum):
     EXPORT = "export as chosen"
     SAVE_PATH = "save the sweep as JSON"
     SAVE_PICTURE = "save the picture as shown"
-    CHOOSE_FOLDER = "ask for the folder by the system's own dialog"
+    CHOOSE_FOLDER = "ask for the file or folder by the system's own dialog"
     CANCEL_ALL = "give up all exports"
     CLEAR = "forget the exports that are over"
 

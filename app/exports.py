@@ -36,7 +36,8 @@ class Exports:
         self._wake = wake
         self._hand_waits = hand_waits
         self._told: set[int] = set()  # exports whose end is known
-        self._dialog: dialogs.Dialog | None = None  # for the folder, while it is open
+        self._dialog: dialogs.Dialog | None = None  # for the place of the export, while it is open
+        self._asked = dialogs.Purpose.OPEN_FOLDER  # by that dialog
         self._made: dict[str, Synthesizer] = {}  # in the queue's thread; the one used last
 
     @property
@@ -77,7 +78,7 @@ class Exports:
         elif request is ExportAction.CLEAR:
             self._queue.clear()
         elif request is ExportAction.CHOOSE_FOLDER:
-            self._ask_folder(choices)
+            self._ask_place(choices)
         elif request is ExportAction.SAVE_PATH:
             save_plan(plan_file(choices), choices.plan())
         elif request is ExportAction.EXPORT and light_field is not None:
@@ -95,20 +96,30 @@ class Exports:
         if answer is None:
             return
         self._dialog = None
-        if answer.path is not None:
+        if answer.path is None:
+            return
+        if self._asked is dialogs.Purpose.SAVE_FILE:
+            choices.folder, choices.name = str(answer.path.parent), answer.path.name.removesuffix(choices.target_path.suffix)
+        else:
             choices.folder = str(answer.path)
 
     def stop(self, timeout: float) -> None:
         """End the thread; what is not finished is given up."""
         self._queue.stop(timeout)
 
-    def _ask_folder(self, choices: ExportChoices) -> None:
+    def _ask_place(self, choices: ExportChoices) -> None:
+        """The file that is to be made, or the folder for what is a folder itself."""
         if self._dialog is not None:
             return  # one is open already
         if not dialogs.available():
             raise InputError("This system has no dialog for folders (zenity or kdialog): type the folder's path.")
-        start = Path(choices.folder).expanduser()
-        question = dialogs.Question(dialogs.Purpose.OPEN_FOLDER, "Folder for exports", start)
+        target = choices.target_path
+        if target.suffix:
+            self._asked = dialogs.Purpose.SAVE_FILE
+            question = dialogs.Question(self._asked, "Export to", target, target.suffix[1:], (f"*{target.suffix}",))
+        else:  # a folder of frames or views
+            self._asked = dialogs.Purpose.OPEN_FOLDER
+            question = dialogs.Question(self._asked, "Folder for exports", Path(choices.folder).expanduser())
         try:
             self._dialog = dialogs.ask(question, self._wake)
         except OSError as error:

@@ -275,6 +275,7 @@ class Dialog:
 
 def test_the_folder_is_chosen_by_a_dialog(controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     export = controller.state.export
+    controller.state.export.format = Format.PNG  # a folder of frames
     monkeypatch.setattr(dialogs, "available", lambda: False)
     with pytest.raises(InputError, match="type the folder"):
         controller.exports.fulfil(ExportAction.CHOOSE_FOLDER, export, controller.light_field, "truth")
@@ -298,3 +299,18 @@ def test_key_frames_stay_when_the_path_is_played(controller: Controller) -> None
     controller.tick(1.0)
     assert controller.viewpoint == (0.1, 0.2)
     assert export.key_frames == (Stop(0.1, 0.2, 0.0),)
+
+
+def test_the_file_is_chosen_by_the_save_dialog(controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    export = controller.state.export
+    export.folder, export.name = str(tmp_path), "rock sweep"
+    asked: list[Question] = []
+    shown = Dialog([Answered(tmp_path / "videos" / "walk.mp4")])
+    monkeypatch.setattr(dialogs, "available", lambda: True)
+    monkeypatch.setattr(dialogs, "ask", lambda question, wake: (asked.append(question), shown)[1])
+    controller.exports.fulfil(ExportAction.CHOOSE_FOLDER, export, None, "")
+    assert [(each.purpose, each.start, each.patterns) for each in asked] == [
+        (Purpose.SAVE_FILE, tmp_path / "rock sweep.mp4", ("*.mp4",))
+    ]
+    controller.exports.follow_dialog(export)
+    assert export.target_path == tmp_path / "videos" / "walk.mp4"

@@ -85,7 +85,7 @@ def _choices() -> dict[str, Run]:
         **{text: _toggled(field) for text, field in switches.items()},
         "A wider path of the export": _reach(0.05),
         "A narrower path of the export": _reach(-0.05),
-        "Choose the folder of the export": request(ExportAction.CHOOSE_FOLDER),
+        "Choose the place of the export": request(ExportAction.CHOOSE_FOLDER),
         "Give up all exports": request(ExportAction.CANCEL_ALL),
         "Forget the exports that are over": request(ExportAction.CLEAR),
     }

@@ -187,7 +187,7 @@ def _folder(context: Context, choices: ExportChoices) -> None:
     imgui.same_line()
     if imgui.button(f"{ask}##folder"):
         context.requests.append(ExportAction.CHOOSE_FOLDER)
-    tooltip("Choose the folder")
+    tooltip("Choose the place by the system's dialog")
 
 
 def _take_keyboard(choices: ExportChoices, field: str) -> None:
