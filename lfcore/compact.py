@@ -9,6 +9,7 @@ is missing. Both see pictures in the root tone (lfcore.tone), which evens out ex
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import torch
 import torch.nn.functional as F
@@ -32,6 +33,19 @@ class CompactConfig:
     fine_width: int = 48  # its channels at half resolution
     colour_width: int = 48
     colour_blocks: int = 2
+
+
+class SweepSettings(Protocol):
+    """What of a config the disparity network needs; see CompactConfig."""
+
+    @property
+    def levels(self) -> Levels: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def dilations(self) -> tuple[int, ...]: ...
+    @property
+    def fine_width(self) -> int: ...
 
 
 class CompactModel(nn.Module):
@@ -65,7 +79,7 @@ class CompactDisparity(nn.Module):
 
     values: Tensor
 
-    def __init__(self, config: CompactConfig) -> None:
+    def __init__(self, config: SweepSettings) -> None:
         super().__init__()
         count, width, fine = config.levels.count, config.width, config.fine_width
         self.stem = nn.Conv2d(2 * count, width, 3, stride=2, padding=1)
@@ -79,6 +93,10 @@ class CompactDisparity(nn.Module):
         self.register_buffer("values", config.levels.values(), persistent=False)
 
     def forward(self, features: Tensor) -> Tensor:
+        return self.look(features)[0]
+
+    def look(self, features: Tensor) -> tuple[Tensor, Tensor]:
+        """The disparity, and what was made of the features on the way to it: (B, fine_width, h, w), not negative."""
         count = self.values.numel()
         scaled = torch.cat((4 * features[:, :count] - 2, 10 * features[:, count:]), 1)
         coarse = F.relu(self.rise(F.relu(self.blocks(self.stem(scaled)))))
@@ -90,7 +108,7 @@ class CompactDisparity(nn.Module):
             agreement = F.avg_pool2d(features[:, count:].float(), 5, 1, 2, count_include_pad=False)
             logits = self.score(h) - self.sharpness * agreement
             coarse_disparity = (logits.softmax(1) * self.values.view(1, -1, 1, 1)).sum(1, keepdim=True)
-            return spread_out(coarse_disparity, self.spread(h))
+            return spread_out(coarse_disparity, self.spread(h)), h
 
 
 def spread_out(coarse: Tensor, logits: Tensor) -> Tensor:

@@ -39,6 +39,10 @@ class Levels:
         """(L,) float32, ascending."""
         return torch.linspace(self.low, self.high, self.count)
 
+    def moved(self, by: float) -> Levels:
+        """As many levels, all `by` px higher."""
+        return Levels(self.count, self.low + by, self.high + by)
+
     @property
     def reach(self) -> float:
         """The largest disparity in size, px."""
@@ -90,7 +94,7 @@ def plane_sweep(
                 for image, (across, down) in zip(luma, offsets.tolist(), strict=True)
             ]
             counted = None if whole else [_counts(across, down, block, luma) for across, down in shifts]
-            mean, deviation = _mean_and_deviation(shifted, counted)
+            mean, deviation = mean_and_deviation(shifted, counted)
             rows = slice(block.top - window.top, block.bottom - window.top)
             columns = slice(block.left - window.left, block.right - window.left)
             means[:, chosen, rows, columns] = mean
@@ -131,7 +135,7 @@ def _level_taps(shifts: Tensor, device: torch.device) -> _LevelTaps:
     return _LevelTaps(first, taps.float().to(device))
 
 
-def _mean_and_deviation(shifted: list[Tensor], counted: list[Tensor] | None) -> tuple[Tensor, Tensor]:
+def mean_and_deviation(shifted: list[Tensor], counted: list[Tensor] | None = None) -> tuple[Tensor, Tensor]:
     """Mean and standard deviation (N - 1) over the inputs (B, L, h, w), or over those that count at each place.
 
     torch.std_mean over a leading dimension is 15 times slower than this. The inputs are overwritten.

@@ -22,6 +22,8 @@ from app.state import Look
 from lfcore.cache import CacheKey, SynthesisCache
 from lfcore.compact import CompactConfig, CompactModel, initialise_compact
 from lfcore.compact_synthesizer import CompactSynthesizer
+from lfcore.fine import SURFACES, FineConfig, FineModel, Surfaces, initialise_fine
+from lfcore.fine_synthesizer import FineSynthesizer
 from lfcore.lightfield import FloatArray
 from lfcore.planesweep import Levels
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
@@ -33,11 +35,22 @@ SIZE = (21, 34)  # odd, so that the networks' phases do not fit
 VIEWPOINT = (0.25, 0.5)
 
 
-@pytest.fixture(scope="module")
-def summing() -> CompactSynthesizer:
-    """Compact networks with random weights whose picture is the weighted sum alone: what they add to it is zero."""
+def compact_model() -> CompactModel:
     model = CompactModel(CompactConfig(levels=Levels(12, -9, 9)))
     initialise_compact(model, 5)
+    return model
+
+
+def fine_model() -> FineModel:
+    model = FineModel(FineConfig(levels=Levels(12, -9, 9)))
+    initialise_fine(model, 5)
+    return model
+
+
+@pytest.fixture(scope="module", params=[compact_model, fine_model])
+def summing(request: pytest.FixtureRequest) -> WeighingSynthesizer:
+    """Networks with random weights whose picture is the weighted sum alone: what they add to it is zero."""
+    model: CompactModel | FineModel = request.param()
     generator = torch.Generator().manual_seed(6)
     with torch.no_grad():
         for parameter in model.parameters():
@@ -46,12 +59,25 @@ def summing() -> CompactSynthesizer:
         for layer in (model.colour.straight, model.colour.residual):
             for parameter in layer.parameters():
                 parameter.zero_()
-    synthesizer = CompactSynthesizer(model.eval(), "key", torch.float32)
+    synthesizer: WeighingSynthesizer
+    if isinstance(model, FineModel):
+        one_surface(model.surfaces)
+        synthesizer = FineSynthesizer(model.eval(), "key", torch.float32)
+    else:
+        synthesizer = CompactSynthesizer(model.eval(), "key", torch.float32)
     synthesizer.set_light_field(light_field(2, 2, SIZE))
     return synthesizer
 
 
-def test_the_picture_is_the_sum_of_the_warped_inputs_by_these_weights(summing: CompactSynthesizer) -> None:
+def one_surface(surfaces: Surfaces) -> None:
+    """Both disparities of a pixel are its own, so that an input's two warped pictures are one."""
+    with torch.no_grad():
+        surfaces.choice.weight.zero_()
+        assert surfaces.choice.bias is not None
+        surfaces.choice.bias.zero_().view(SURFACES, -1, 4)[:, 0] = 50.0
+
+
+def test_the_picture_is_the_sum_of_the_warped_inputs_by_these_weights(summing: WeighingSynthesizer) -> None:
     plain, weighed = summing.synthesize(*VIEWPOINT), summing.synthesize_weighed(*VIEWPOINT)
     np.testing.assert_array_equal(plain.image, weighed.image)
     weights = weighed.weights
@@ -66,7 +92,7 @@ def test_the_picture_is_the_sum_of_the_warped_inputs_by_these_weights(summing: C
     assert float(np.quantile(np.abs(found - expected), 0.98)) < 4 * 0.5 / 255
 
 
-def test_who_can_tell_weights_says_so(summing: CompactSynthesizer) -> None:
+def test_who_can_tell_weights_says_so(summing: WeighingSynthesizer) -> None:
     assert isinstance(summing, WeighingSynthesizer)
     assert weighs(summing)
     assert not weighs(MeanSynthesizer())

@@ -13,12 +13,12 @@ from lfcore.lightfield import LightField
 from lfcore.metrics import k16, k16_view, psnr
 from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel
-from lfcore.synthesizer import MeanSynthesizer, Synthesizer, corner_tensor, make_synthesizer, reference_synthesis
+from lfcore.synthesizer import MODEL_NAMES, MeanSynthesizer, Synthesizer, corner_tensor, make_synthesizer, reference_synthesis
 from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
 
 BUTTERCUP = Path(__file__).parents[2] / "shared" / "data" / "val" / "Buttercup"
-SHIPPED = ("full", "realtime", "single")
+SHIPPED = ("full", "fine", "realtime", "single")
 SCENES = [
     sample_path(),
     pytest.param(
@@ -65,6 +65,15 @@ def test_the_small_pair_is_far_above_the_mean_and_not_below_the_papers(path: Pat
     small, mean, full = (score(make_synthesizer(name), field) for name in ("realtime", "mean", "full"))
     assert small > mean + 3
     assert small > full - 0.5
+
+
+@pytest.mark.parametrize("path", SCENES)
+def test_the_larger_pair_is_above_all_but_the_small_one_and_not_below_that(path: Path) -> None:
+    field = open_light_field(path)
+    scores = {name: score(make_synthesizer(name), field) for name in MODEL_NAMES}
+    small = scores.pop("realtime")
+    assert max(scores, key=lambda name: scores[name]) == "fine"
+    assert scores["fine"] > small - 0.1
 
 
 @pytest.mark.skipif(not BUTTERCUP.is_dir(), reason="the shared test data is not beside the repository")

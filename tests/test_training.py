@@ -1,6 +1,7 @@
 import copy
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +13,17 @@ from lfcore.compact import CompactModel
 from lfcore.compact_synthesizer import CompactSynthesizer
 from lfcore.errors import InputError
 from lfcore.export import write_picture
+from lfcore.fine import FineModel
 from lfcore.lightfield import CORNERS, LightField
 from lfcore.models import TRAINABLE
 from lfcore.networks import BORDER, FullModel, initialise
 from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
-from lfcore.training.architectures import Batch, architecture
+from lfcore.training.architectures import Batch, Prediction, architecture, begin_from
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, learning_rate, prepare_scene, train
-from lfcore.training.loss import LossConfig, StepLoss
-from lfcore.training.patches import PatchConfig, TrainingScene, margin, mixed, sample_group
+from lfcore.training.loss import LossConfig, StepLoss, cut
+from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, margin, mixed, sample_group
 from lfcore.training.plot import plot
 from lfcore.warp import backward_warp
 from lfcore.weights import load_weights
@@ -71,9 +73,100 @@ def test_patches_agree_with_their_inputs_under_shear_symmetry_and_tone() -> None
     assert min(disparities) < 0 < max(disparities)
 
 
+def test_shears_and_shifts_together_leave_no_gap_among_the_disparities() -> None:
+    """Of a plane seen by 8 x 8 views, shears alone would show disparities 7 px apart."""
+    field = plane(3.0, (8, 8), (190, 190))
+    sheared, seen = set(), []
+    for step in range(150):
+        group = sample_group([TrainingScene(field, 3.0, 3.0)], SMALL, LEVELS, np.random.default_rng((5, step)))
+        candidates = 3.0 + 7 * np.arange(-3, 3)
+        if abs(7 * group.u - round(7 * group.u)) > 1e-6 or abs(7 * group.v - round(7 * group.v)) > 1e-6:
+            continue  # of a smaller sub-grid
+        errors = [plane_error(group, float(candidate)) for candidate in candidates]
+        found = float(candidates[int(np.argmin(errors))])
+        assert min(errors) < 0.01
+        sheared.add(found)
+        seen.append(found + group.shift)
+    assert len(sheared) >= 4 and min(seen) >= -21 and max(seen) <= 21
+    middle = [disparity for disparity in sorted(seen) if abs(disparity) < 12]
+    assert max(np.diff(middle)) < 3 and middle[0] < -9 and middle[-1] > 9
+
+
+def plane_error(group: PatchGroup, disparity: float) -> float:
+    """Mean difference of the inputs, warped by one disparity, from the novel view, where all have samples."""
+    inputs, target = torch.from_numpy(group.inputs[:, 0]), torch.from_numpy(group.target[0])
+    w, offsets = group.window, corner_offsets(group.u, group.v)
+    flat = torch.full((1, 1, w.bottom - w.top, w.right - w.left), disparity)
+    warped = torch.cat([backward_warp(inputs[i : i + 1], flat, offsets[i : i + 1], (w.top, w.left)) for i in range(4)])
+    seen = (warped != 0).all(1, keepdim=True).all(0)
+    return float(((warped - target).abs() * seen).sum() / (12 * seen.sum())) if int(seen.sum()) > 300 else math.inf
+
+
+class Constant(torch.nn.Module):
+    """A disparity network that has made up its mind; what it was given is kept."""
+
+    def __init__(self, disparity: float, border: int) -> None:
+        super().__init__()
+        self.disparity, self.border = disparity, border
+        self.given = torch.empty(0)
+        self.unused = torch.nn.Parameter(torch.zeros(1))  # it tells the device
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        self.given = features
+        size = [extent - 2 * self.border for extent in features.shape[2:]]
+        return torch.full((features.shape[0], 1, *size), self.disparity)
+
+
+class MeanOfInputs(torch.nn.Module):
+    """A colour network that takes the mean of the paper's warped inputs."""
+
+    def forward(self, h: torch.Tensor) -> torch.Tensor:
+        return cut(h[:, 1:13].unflatten(1, (4, 3)).mean(1), BORDER)  # the disparity stands before them
+
+
+@pytest.mark.parametrize("shift", [-3.0, 0.0, 2.5])
+def test_a_shifted_sweep_shows_disparities_that_are_so_much_higher(shift: float) -> None:
+    """The levels' least deviation lies at the shifted disparity, and by that disparity the inputs are warped rightly."""
+    alone = replace(SMALL, batch=1, group=1, edge_share=0)
+    drawn = sample_group([scene(3.0)], alone, LEVELS, np.random.default_rng(6))
+    group = replace(drawn, shift=shift)
+    real = min(np.arange(-21, 21.01, 0.25), key=lambda candidate: plane_error(group, float(candidate)))
+    batch = Batch.of([group], torch.device("cpu"))
+    pair, model = architecture("full"), FullModel()
+    model.disparity, model.colour = Constant(float(real) + shift, BORDER), MeanOfInputs()  # type: ignore[assignment]
+    with torch.no_grad():
+        prediction = pair.predict(model, batch, lambda: torch.autocast("cpu", enabled=False))
+        _, loss = StepLoss(model, pair, LossConfig(matching_steps=2, matching_weight=1.0), False)(batch, 0)
+    torch.testing.assert_close(prediction.image, cut(batch.targets, 2 * BORDER), atol=0.02, rtol=0)
+    deviations = model.disparity.given[:, LEVELS.count :].mean((0, 2, 3))
+    assert abs(float(LEVELS.values()[deviations.argmin()]) - (real + shift)) < 0.6
+    assert float(loss) < 0.3  # the best match is where the network says
+
+
+@pytest.mark.parametrize("name", ["realtime", "fine"])
+def test_the_other_pairs_sweep_and_warp_with_the_shift_too(name: str) -> None:
+    """Their answer to a shifted group is that to the same group without a shift, if the levels are those of the shift."""
+    drawn = sample_group([scene(3.0)], replace(SMALL, edge_share=0), LEVELS, np.random.default_rng(7))
+    pair = architecture(name)
+    model = pair.start(2)
+    assert isinstance(model, CompactModel | FineModel)
+    with torch.no_grad():
+        model.disparity.sharpness.fill_(1000.0)  # untrained as it is, it takes the least deviation at its word
+
+    def predicted(shift: float) -> Prediction:
+        with torch.no_grad():
+            batch = Batch.of([replace(drawn, shift=shift)], torch.device("cpu"))
+            return pair.predict(model, batch, lambda: torch.autocast("cpu", enabled=False))
+
+    plain, shifted = predicted(0.0), predicted(2.0)
+    assert plain.disparity is not None and shifted.disparity is not None
+    assert float((shifted.disparity - plain.disparity).median()) == pytest.approx(2.0, abs=0.4)
+    assert float((shifted.image - plain.image).abs().mean()) < 0.02
+
+
 def test_all_novel_positions_of_all_sub_grids_are_drawn_but_no_corner() -> None:
     drawn = set()
-    for step in range(400):
+    for step in range(1000):
         group = sample_group([scene(1.0)], SMALL, LEVELS, np.random.default_rng((2, step)))
         drawn.add((round(group.u * 6), round(group.v * 6)))
     thirds = {(2 * a, 2 * b) for a, b in itertools.product(range(4), repeat=2)}
@@ -174,13 +267,29 @@ def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None
         torch.testing.assert_close(found.model.state_dict()[name], value, atol=1e-5, rtol=1e-4)
 
 
+def test_the_larger_pair_begins_with_the_small_ones_disparity(tmp_path: Path) -> None:
+    train_small(tmp_path, 1, "small", model="realtime")
+    given = load_weights(tmp_path / "small.safetensors")
+    model = architecture("fine").start(1)
+    before = {name: value.clone() for name, value in model.state_dict().items()}
+    begin_from(model, given.model)
+    for name, value in model.state_dict().items():
+        wanted = given.model.state_dict()[name] if name.startswith("disparity.") else before[name]
+        torch.testing.assert_close(value, wanted, atol=0, rtol=0)
+    with pytest.raises(InputError, match="of realtime, not of full"):
+        scenes = [plane(2.0, (3, 3), (120, 120))]
+        out, run = tmp_path / "o.safetensors", tmp_path / "r"
+        train(TrainConfig(model="full", patches=SMALL), Runtime("cpu"), scenes, [], out, run, print, lambda: False, given)
+
+
 def test_a_teacher_adds_the_distance_to_its_disparity(tmp_path: Path) -> None:
     train_small(tmp_path, 1, "teacher", model="realtime")
     teacher = load_weights(tmp_path / "teacher.safetensors")
     assert isinstance(teacher.model, CompactModel)
     pair, model = architecture("full"), FullModel()
     initialise(model, 1)
-    batch = Batch.of([sample_group([scene(3.0)], SMALL, LEVELS, np.random.default_rng(5))], torch.device("cpu"))
+    drawn = sample_group([scene(3.0)], SMALL, LEVELS, np.random.default_rng(5))
+    batch = Batch.of([replace(drawn, shift=0.0)], torch.device("cpu"))
     weight = LossConfig(matching_steps=0, teacher_weight=0.7)
     with torch.no_grad():
         _, alone = StepLoss(model, pair, weight, False)(batch, 0)
@@ -231,7 +340,7 @@ def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_p
         train(config, Runtime(device="cpu"), *arguments)
 
 
-@pytest.mark.parametrize("model", ["full", "realtime"])
+@pytest.mark.parametrize("model", ["full", "realtime", "fine"])
 def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path, model: str) -> None:
     config = TrainConfig(
         model=model, learning_rate=3e-4, warm_up_steps=1, loss=LossConfig(matching_steps=0), patches=SMALL

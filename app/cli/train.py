@@ -38,9 +38,10 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     )
     parser.add_argument(
         "--model",
-        choices=["full", "realtime", "single"],
+        choices=["full", "fine", "realtime", "single"],
         default="full",
-        help="what to train: the paper's networks (full, the default), the small pair, or the paper's one-network ablation",
+        help="what to train: the paper's networks (full, the default), the larger pair of this program (fine), the small one "
+        "(realtime), or the paper's one-network ablation (single)",
     )
     parser.add_argument(
         "--data",
@@ -89,7 +90,10 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument(
         "--teacher-weight", type=positive, metavar="W", default=0.1, help="how much the teacher counts (default: 0.1)"
     )
-    parser.add_argument("--init", metavar="FILE", type=Path, help="weights to go on from, in place of random ones")
+    parser.add_argument("--init",
+        metavar="FILE",
+        type=Path,
+        help="weights to go on from, in place of random ones; fine may begin with those of realtime")
     parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
     parser.add_argument(
         "--run-dir",

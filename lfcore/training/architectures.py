@@ -15,9 +15,10 @@ from torch import Tensor
 
 from lfcore.compact import CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
+from lfcore.fine import FineModel, initialise_fine
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
-from lfcore.planesweep import Levels, Window, plane_sweep
+from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tone import root_tone
 from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
@@ -56,7 +57,8 @@ class Batch:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model makes of a batch. `border`: what the picture, and the disparity, lose on each side of the patch, px."""
+    """What a model makes of a batch. `border`: what the picture, and the disparity, lose on each side of the patch, px. The
+    disparity is that of the scene with its group's shift."""
 
     image: Tensor  # (sum of B, 3, P - 2 border, P - 2 border)
     border: int
@@ -112,7 +114,7 @@ class PaperPair:
         lumas = [sweep_luminance(images, model.config) for images in batch.inputs]
         features = torch.cat(
             [
-                plane_sweep(luma, offsets, model.config.levels, group.window)
+                plane_sweep(luma, offsets, model.config.levels.moved(-group.shift), group.window)
                 for luma, offsets, group in zip(lumas, batch.offsets, batch.groups, strict=True)
             ]
         )  # (sum of B, 2 L, P, P)
@@ -121,7 +123,7 @@ class PaperPair:
         pieces = disparity.split(batch.sizes)
         warped = torch.cat(
             [
-                warp_inputs(images, piece, offsets, (group.window.top + BORDER, group.window.left + BORDER))
+                warp_inputs(images, piece - group.shift, offsets, (group.window.top + BORDER, group.window.left + BORDER))
                 for images, piece, offsets, group in zip(batch.inputs, pieces, batch.offsets, batch.groups, strict=True)
             ]
         )
@@ -161,13 +163,7 @@ class CompactPair:
         assert isinstance(model, CompactModel)
         places = _places(batch)
         disparity = self._disparity(model, batch, places, autocast)
-        pieces = disparity.split(batch.sizes)
-        warped = torch.cat(
-            [
-                _quick_warp_inputs(root_tone(place.images), piece, offsets, place.window)
-                for place, piece, offsets in zip(places, pieces, batch.offsets, strict=True)
-            ]
-        )
+        warped = _BatchWarp(places, batch).pictures(disparity)
         with autocast():
             image = model.colour(warped, disparity, batch.positions)  # (., 3, P, P)
         inside = slice(self.RIM, -self.RIM)
@@ -180,16 +176,45 @@ class CompactPair:
     def _disparity(
         self, model: CompactModel, batch: Batch, places: Sequence[_Place], autocast: Autocast
     ) -> Tensor:
-        levels = half_resolution(model.config.levels)
-        features = torch.cat(
-            [
-                plane_sweep(half_luma(place.images), offsets, levels, _halved(place.window))
-                for place, offsets in zip(places, batch.offsets, strict=True)
-            ]
-        )  # (sum of B, 2 L, P / 2, P / 2)
+        features = _half_sweep(places, batch, model.config.levels)
         with autocast():
             disparity: Tensor = model.disparity(features)  # (., 1, P, P)
         return disparity
+
+
+class FinePair:
+    """The larger pair, whose first disparity network is the small pair's."""
+
+    RIM = 12
+
+    def levels(self) -> Levels:
+        """See Architecture."""
+        return FineModel().config.levels
+
+    def start(self, seed: int) -> Model:
+        """See Architecture."""
+        model = FineModel()
+        initialise_fine(model, seed)
+        return model
+
+    def prepare(self, model: Model) -> None:
+        """See Architecture."""
+
+    def plain(self, model: Model) -> Model:
+        """See Architecture."""
+        assert isinstance(model, FineModel)
+        plain = FineModel(model.config)
+        plain.load_state_dict({name: value.float().cpu() for name, value in model.state_dict().items()})
+        return plain
+
+    def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
+        """See Architecture."""
+        assert isinstance(model, FineModel)
+        places = _places(batch)
+        features = _half_sweep(places, batch, model.config.levels)
+        result = model(features, _BatchWarp(places, batch), batch.positions, autocast)  # pictures (., 3, P, P)
+        inside = slice(self.RIM, -self.RIM)
+        return Prediction(result.image[:, :, inside, inside], self.RIM, result.disparities[:, :1], 0)
 
 
 class SingleNetwork:
@@ -230,12 +255,29 @@ class SingleNetwork:
         return Prediction(image, BORDER, None, 0)
 
 
-_ARCHITECTURES: dict[str, Architecture] = {"full": PaperPair(), "realtime": CompactPair(), "single": SingleNetwork()}
+_ARCHITECTURES: dict[str, Architecture] = {
+    "full": PaperPair(),
+    "realtime": CompactPair(),
+    "fine": FinePair(),
+    "single": SingleNetwork(),
+}
 
 
 def architecture(name: str) -> Architecture:
     """By the name of a model, one of lfcore.models.TRAINABLE."""
     return _ARCHITECTURES[name]
+
+
+# Models by whose weights another can begin.
+STARTS = {name: (name,) for name in _ARCHITECTURES} | {"fine": ("fine", "realtime")}
+
+
+def begin_from(model: Model, initial: Model) -> None:
+    """Copy weights: all of them, or of another model of STARTS those of the part that both have."""
+    if isinstance(model, FineModel) and isinstance(initial, CompactModel):
+        model.disparity.load_state_dict(initial.disparity.state_dict())
+    else:
+        model.load_state_dict(initial.state_dict())
 
 
 def warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, origin: tuple[int, int]) -> Tensor:
@@ -245,6 +287,43 @@ def warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, origin: tupl
     offset = offsets.to(disparity.device).repeat_interleave(b, 0)  # (4 B, 2)
     warped = backward_warp(inputs.reshape(n * b, c, height, width), spread, offset, origin)
     return warped.view(n, b, c, *warped.shape[2:]).transpose(0, 1).flatten(1, 2)
+
+
+def _half_sweep(places: Sequence[_Place], batch: Batch, levels: Levels) -> Tensor:
+    """Features of the small pair's disparity network, at half the resolution: (sum of B, 2 L, P / 2, P / 2)."""
+    return torch.cat(
+        [
+            plane_sweep(half_luma(place.images), offsets, half_resolution(levels.moved(-group.shift)), _halved(place.window))
+            for place, offsets, group in zip(places, batch.offsets, batch.groups, strict=True)
+        ]
+    )
+
+
+class _BatchWarp:
+    """See lfcore.fine.Warp: the inputs of all groups."""
+
+    def __init__(self, places: Sequence[_Place], batch: Batch) -> None:
+        self._batch = batch
+        self._toned = [_Place(root_tone(place.images), place.window) for place in places]
+        self._places = places
+
+    def pictures(self, disparity: Tensor) -> Tensor:
+        """See Warp."""
+        return self._warped(self._toned, disparity)
+
+    def luminances(self, disparity: Tensor) -> list[Tensor]:
+        """See Warp."""
+        lumas = [_Place(root_tone(luminance(place.images)).unsqueeze(2), place.window) for place in self._places]
+        return list(self._warped(lumas, disparity).split(1, 1))
+
+    def _warped(self, places: Sequence[_Place], disparity: Tensor) -> Tensor:
+        pieces = zip(places, disparity.split(self._batch.sizes), self._batch.offsets, self._batch.groups, strict=True)
+        return torch.cat(
+            [
+                _quick_warp_inputs(place.images, piece - group.shift, offsets, place.window)
+                for place, piece, offsets, group in pieces
+            ]
+        )
 
 
 def _quick_warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, window: Window) -> Tensor:

@@ -83,8 +83,9 @@ def _matching_loss(batch: Batch, prediction: Prediction) -> Tensor:
         if min(w.top, w.left, height - w.bottom, width - w.right) < BORDER:
             continue  # at an edge of the picture not all samples count
         luma, wanted = root_tone(luminance(images)), root_tone(luminance(target))
-        found, confidence = (cut(part, border) for part in matching_disparity(luma, offsets, Levels(), w, wanted))
-        error = F.smooth_l1_loss(disparity, found, reduction="none")
+        levels = Levels().moved(-group.shift)
+        found, confidence = (cut(part, border) for part in matching_disparity(luma, offsets, levels, w, wanted))
+        error = F.smooth_l1_loss(disparity, found + group.shift, reduction="none")
         return (confidence * error).mean()  # one group a step is enough, and costs less than all
     return 0 * prediction.disparity.sum()
 

@@ -2,7 +2,9 @@
 
 From one light field come all square sub-grids, all their novel positions, flips and transposes (positions and pixels
 together), shears, and tones that are the same for all five views. A shear crops view (row, column) at a place that moves by
-m whole pixels per view: exact, and it adds the same number of pixels to every disparity.
+m whole pixels per view: exact, and it adds the same number of pixels to every disparity. What lies between two such shears
+comes from a shift of the sweep: with all its levels s px lower, the networks see what they would see of a scene whose
+disparities are s px higher, and that is exact too, and free.
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ class PatchConfig:
     candidates: int = 2  # of so many places in a light field, the one whose corner views differ most is taken
     edge_share: float = 0.15  # groups that lie at an edge of the picture, where not all samples count
     tone_share: float = 0.5  # patches whose tone is changed
-    shear_spread: float = 6.0  # standard deviation of the disparity that a patch's scene is sheared to, px
+    shear_spread: float = 6.0  # standard deviation of the disparity that a patch's scene is brought to, px
+    even_share: float = 0.5  # of the patches; the disparities that their scenes are brought to are spread evenly instead,
+    even_reach: float = 15.0  # from -even_reach to even_reach, px
 
     def __post_init__(self) -> None:
         if self.size < 32 or self.batch < 1 or self.group < 1 or self.batch % self.group:
@@ -61,12 +65,17 @@ class PatchGroup:
     window: Window  # where the target lies in the inputs
     u: float
     v: float
+    shift: float = 0.0  # px that are added to every disparity by a sweep whose levels are so much lower
+
+
+# Half of what lies between two shears of a whole grid of 8 x 8 views, the widest step there is here.
+MOST_SHIFT = 3.5
 
 
 def margin(levels: Levels) -> int:
-    """How far beyond the patch a warp inside the corners can reach: the largest level and two taps. Even, so that patches
-    begin at a whole pixel of half the resolution too."""
-    return 2 * int(np.ceil((levels.reach + 2) / 2))
+    """How far beyond the patch a warp inside the corners can reach: the largest level, a shift and two taps. Even, so that
+    patches begin at a whole pixel of half the resolution too."""
+    return 2 * int(np.ceil((levels.reach + MOST_SHIFT + 2) / 2))
 
 
 def check_room(scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels) -> None:
@@ -102,13 +111,14 @@ def sample_group(
     before_y, before_x, after_y, after_x = _draw_margins(reach, config.edge_share, rng)
     shape = before_y + config.size + after_y, before_x + config.size + after_x
     window = Window(before_y, before_y + config.size, before_x, before_x + config.size)
+    shift = float(rng.uniform(-MOST_SHIFT, MOST_SHIFT))
     patches = []
     for _ in range(config.group):
         scene = _draw_scene(eligible, rng)
-        views = _draw_views(scene, u, v, shape, levels, config, rng)
+        views = _draw_views(scene, u, v, shape, levels.moved(-shift), config, rng)
         patches.append(_draw_tone(views, float(u), float(v), config.tone_share, rng))
     stack = np.stack(patches, 1)  # (5, B, H, W, 3): TL, BL, TR, BR, novel
-    return _draw_symmetry(stack, window, float(u), float(v), rng)
+    return replace(_draw_symmetry(stack, window, float(u), float(v), rng), shift=shift)
 
 
 def _draw_scene(scenes: Sequence[TrainingScene], rng: np.random.Generator) -> TrainingScene:
@@ -161,7 +171,7 @@ def _draw_views(
     spacing = spacings[int(rng.choice(len(spacings), p=_shares(np.array(spacings))))]
     row0 = int(rng.integers(field.rows - spacing))
     column0 = int(rng.integers(field.columns - spacing))
-    shear = _draw_shear(scene, spacing, levels, config.shear_spread, rng)
+    shear = _draw_shear(scene, spacing, levels, config, rng)
     most = min(field.height - shape[0], field.width - shape[1]) // spacing  # what the picture has room for
     shear = min(max(shear, -most), most)
     corners = [(int(q) * spacing, int(p) * spacing) for p, q in CORNERS]
@@ -194,15 +204,20 @@ def _difference(views: npt.NDArray[np.generic]) -> float:
 
 
 def _draw_shear(
-    scene: TrainingScene, spacing: int, levels: Levels, spread: float, rng: np.random.Generator
+    scene: TrainingScene, spacing: int, levels: Levels, config: PatchConfig, rng: np.random.Generator
 ) -> int:
-    """Whole pixels per view that move the scene's middle to a disparity drawn around 0, within the levels."""
+    """Whole pixels per view that bring the scene's middle near a disparity drawn around the middle of the levels, within
+    them."""
     scale = spacing / scene.spacing
     low, high = scene.low * scale, scene.high * scale
-    wanted = rng.normal(0, spread) - (low + high) / 2
+    even = rng.random() < config.even_share
+    wanted = rng.uniform(-config.even_reach, config.even_reach) if even else rng.normal(0, config.shear_spread)
+    wanted += (levels.low + levels.high) / 2 - (low + high) / 2
     first = int(np.ceil((levels.low + 1 - low) / spacing))
     last = int(np.floor((levels.high - 1 - high) / spacing))
-    return int(np.clip(round(wanted / spacing), min(first, 0), max(last, 0)))
+    if first > last:  # wider than the levels
+        return round((first + last) / 2)
+    return int(np.clip(round(wanted / spacing), first, last))
 
 
 # Patches brighter than this are taken for encoded with a gamma; linear light is darker.
