@@ -33,7 +33,7 @@ class PatchConfig:
     edge_share: float = 0.15  # groups that lie at an edge of the picture, where not all samples count
     tone_share: float = 0.5  # patches whose tone is changed
     shear_spread: float = 6.0  # standard deviation of the disparity that a patch's scene is brought to, px
-    even_share: float = 0.5  # of the patches; the disparities that their scenes are brought to are spread evenly instead,
+    even_share: float = 0.4  # of the patches; the disparities that their scenes are brought to are spread evenly instead,
     even_reach: float = 15.0  # from -even_reach to even_reach, px
 
     def __post_init__(self) -> None:
