@@ -168,6 +168,16 @@ def log_nearness(positions: Tensor) -> Tensor:
 
 def initialise_compact(model: CompactModel, seed: int) -> None:
     """He initialisation; what is added to a path that already works starts small."""
+    initialise_layers(model, seed)
+    with torch.no_grad():
+        model.colour.straight.weight.zero_()
+        for layer in (model.colour.weights, model.colour.residual):
+            layer.weight *= 0.1
+        start_as_sweep(model.disparity)
+
+
+def initialise_layers(model: nn.Module, seed: int) -> None:
+    """He initialisation of all convolutions; residual blocks start small."""
     generator = torch.Generator().manual_seed(seed)
     for module in model.modules():
         if isinstance(module, nn.Conv2d):
@@ -175,13 +185,15 @@ def initialise_compact(model: CompactModel, seed: int) -> None:
             if module.bias is not None:
                 nn.init.zeros_(module.bias)
     with torch.no_grad():
-        model.colour.straight.weight.zero_()
         for module in model.modules():
             if isinstance(module, ResidualBlock):
                 module.second.weight *= 0.3
-        for layer in (model.disparity.score, model.disparity.spread, model.colour.weights, model.colour.residual):
-            layer.weight *= 0.1
-        # Full resolution starts as the coarse pixel itself, mostly.
-        bias = model.disparity.spread.bias
-        assert bias is not None
-        bias.view(4, 9)[:, 4] = 2.0
+
+
+def start_as_sweep(network: CompactDisparity) -> None:
+    """Begin with little more than the sweep's own minimum; full resolution starts as the coarse pixel itself, mostly."""
+    with torch.no_grad():
+        network.score.weight *= 0.1
+        network.spread.weight *= 0.1
+        assert network.spread.bias is not None
+        network.spread.bias.view(4, 9)[:, 4] = 2.0

@@ -37,6 +37,13 @@ def half_luma(images: Tensor) -> Tensor:
     return F.avg_pool2d(luma.flatten(0, -3), 2).view(*luma.shape[:-2], luma.shape[-2] // 2, luma.shape[-1] // 2)
 
 
+def continued(corners: Tensor) -> Tensor:
+    """Corner views (4, 3, H, W) continued beyond their edges by REACH, and to whole blocks of ALIGNMENT px."""
+    height, width = corners.shape[2:]
+    filled = [-size % ALIGNMENT for size in (height, width)]
+    return F.pad(corners, (REACH, REACH + filled[1], REACH, REACH + filled[0]), mode="replicate")
+
+
 class CompactSynthesizer:
     """See lfcore.synthesizer.Synthesizer. Memory while it works: about 600 bytes a pixel.
 
@@ -55,11 +62,8 @@ class CompactSynthesizer:
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
-        corners = corner_tensor(light_field)  # (4, 3, H, W)
-        height, width = corners.shape[2:]
-        filled = [-size % ALIGNMENT for size in (height, width)]
-        padded = F.pad(corners, (REACH, REACH + filled[1], REACH, REACH + filled[0]), mode="replicate")
-        self._size = height, width
+        padded = continued(corner_tensor(light_field))
+        self._size = light_field.height, light_field.width
         self._shifted = root_tone(padded).sub_(0.5)
         self._luma = sweep_input(half_luma(padded).unsqueeze(1))
 

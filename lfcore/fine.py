@@ -17,7 +17,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from lfcore.compact import CompactDisparity, ResidualBlock, log_nearness
+from lfcore.compact import CompactDisparity, ResidualBlock, initialise_layers, log_nearness, start_as_sweep
 from lfcore.networks import INPUTS
 from lfcore.planesweep import Levels, mean_and_deviation
 from lfcore.tone import stored_from_root
@@ -221,22 +221,13 @@ def _widest(values: Tensor, size: int) -> Tensor:
 
 def initialise_fine(model: FineModel, seed: int) -> None:
     """He initialisation; what is added to a path that already works starts small."""
-    generator = torch.Generator().manual_seed(seed)
-    for module in model.modules():
-        if isinstance(module, nn.Conv2d):
-            nn.init.kaiming_normal_(module.weight, nonlinearity="relu", generator=generator)
-            if module.bias is not None:
-                nn.init.zeros_(module.bias)
+    initialise_layers(model, seed)
     with torch.no_grad():
         model.colour.straight.weight.zero_()
-        for module in model.modules():
-            if isinstance(module, ResidualBlock):
-                module.second.weight *= 0.3
-        first = model.disparity
-        for layer in (first.score, first.spread, model.surfaces.choice, model.colour.weights, model.colour.residual):
+        for layer in (model.surfaces.choice, model.colour.weights, model.colour.residual):
             layer.weight *= 0.1
-        assert first.spread.bias is not None and model.surfaces.choice.bias is not None
-        first.spread.bias.view(4, 9)[:, 4] = 2.0  # full resolution starts as the coarse pixel itself, mostly
+        start_as_sweep(model.disparity)
         # The first surface starts as the pixel's own, the second as the nearest other.
+        assert model.surfaces.choice.bias is not None
         starts = model.surfaces.choice.bias.view(SURFACES, _CANDIDATES + 1, 4)
         starts[0, 0], starts[1, 1] = 3.0, 2.0

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
-from lfcore.compact import ALIGNMENT
-from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
+from lfcore.compact_synthesizer import REACH, continued, half_luma, half_resolution
 from lfcore.errors import InputError
 from lfcore.fine import SURFACES, FineModel
 from lfcore.lightfield import LightField, check_viewpoint
@@ -38,11 +36,8 @@ class FineSynthesizer:
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
-        corners = corner_tensor(light_field)  # (4, 3, H, W)
-        height, width = corners.shape[2:]
-        filled = [-size % ALIGNMENT for size in (height, width)]
-        padded = F.pad(corners, (REACH, REACH + filled[1], REACH, REACH + filled[0]), mode="replicate")
-        self._size = height, width
+        padded = continued(corner_tensor(light_field))
+        self._size = light_field.height, light_field.width
         self._toned = root_tone(padded)
         self._luma = root_tone(luminance(padded)).unsqueeze(1)
         self._half_luma = half_luma(padded).unsqueeze(1)
