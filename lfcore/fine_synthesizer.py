@@ -9,10 +9,10 @@ import torch
 from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
-from lfcore.compact_synthesizer import REACH, continued, half_luma, half_resolution
+from lfcore.compact_synthesizer import REACH, LateSynthesis, continued, half_luma, half_resolution
 from lfcore.errors import InputError
-from lfcore.fine import SURFACES, FineModel
-from lfcore.lightfield import LightField, check_viewpoint
+from lfcore.fine import SURFACES, FineModel, FineResult
+from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.planesweep import Window, luminance, plane_sweep
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
@@ -48,17 +48,18 @@ class FineSynthesizer:
         return True
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
-        return self._computed(u, v, cancelled)[0]
+        synthesis, result = self._computed(u, v, cancelled)
+        return synthesis.with_warped(lambda: self._picture_of_warped(result.warped))
 
     def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
-        """See WeighingSynthesizer: an input's share is that of both its warped pictures."""
-        synthesis, weights = self._computed(u, v, cancelled)
+        """See WeighingSynthesizer: an input's share is that of both its warped pictures, which are not put together."""
+        synthesis, result = self._computed(u, v, cancelled)
         height, width = self._size
-        shares = weights[0, :, :height, :width].unflatten(0, (SURFACES, -1)).sum(0)  # (4, H, W)
+        shares = result.weights[0, :, :height, :width].unflatten(0, (SURFACES, -1)).sum(0)  # (4, H, W)
         return replace(synthesis, weights=(255 * shares).round().to(torch.uint8).contiguous().numpy())
 
-    def _computed(self, u: float, v: float, cancelled: Callable[[], bool]) -> tuple[Synthesis, Tensor]:
-        """The synthesis, and the weights of the eight warped inputs, (1, 8, H', W')."""
+    def _computed(self, u: float, v: float, cancelled: Callable[[], bool]) -> tuple[LateSynthesis, FineResult]:
+        """The synthesis without warped inputs, and all that came out of the networks, in whole blocks of pixels."""
         if self._toned is None or self._luma is None or self._half_luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
@@ -78,17 +79,23 @@ class FineSynthesizer:
             warp = _CornerWarp(self._toned, self._luma, offsets)
             result = self._model(features, warp, torch.tensor([[u, v]]), self._autocast, passed)
             height, width = self._size
-            inputs = result.warped[0, :12, :height, :width].reshape(4, 3, height, width)
-            synthesis = Synthesis(
+            synthesis = LateSynthesis(
                 u,
                 v,
                 self.name,
                 picture(result.image[0, :, :height, :width].clamp_(0, 1)),
                 result.disparities[0, 0, :height, :width].contiguous().numpy(),
-                picture(stored_from_root(inputs).clamp_(0, 1)),
+                None,
                 clock.timings(),
             )
-        return synthesis, result.weights
+        return synthesis, result
+
+    def _picture_of_warped(self, warped: Tensor) -> FloatArray:
+        """The inputs as the pixel's own disparity warps them, (4, H, W, 3)."""
+        height, width = self._size
+        with torch.inference_mode():
+            inputs = warped[0, :12, :height, :width].reshape(4, 3, height, width)
+            return picture(stored_from_root(inputs).clamp_(0, 1))
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast("cpu", torch.bfloat16, enabled=self.dtype == torch.bfloat16)

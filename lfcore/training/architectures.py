@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import torch
@@ -154,9 +155,7 @@ class CompactPair:
     def plain(self, model: Model) -> Model:
         """See Architecture."""
         assert isinstance(model, CompactModel)
-        plain = CompactModel(model.config)
-        plain.load_state_dict({name: value.float().cpu() for name, value in model.state_dict().items()})
-        return plain
+        return _copied(model, CompactModel(model.config))
 
     def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
         """See Architecture."""
@@ -203,9 +202,7 @@ class FinePair:
     def plain(self, model: Model) -> Model:
         """See Architecture."""
         assert isinstance(model, FineModel)
-        plain = FineModel(model.config)
-        plain.load_state_dict({name: value.float().cpu() for name, value in model.state_dict().items()})
-        return plain
+        return _copied(model, FineModel(model.config))
 
     def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
         """See Architecture."""
@@ -235,9 +232,7 @@ class SingleNetwork:
 
     def plain(self, model: Model) -> Model:
         """See Architecture."""
-        plain = SingleModel()
-        plain.load_state_dict({name: value.float().cpu() for name, value in model.state_dict().items()})
-        return plain
+        return _copied(model, SingleModel())
 
     def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
         """See Architecture."""
@@ -280,6 +275,12 @@ def begin_from(model: Model, initial: Model) -> None:
         model.load_state_dict(initial.state_dict())
 
 
+def _copied(model: Model, onto: Model) -> Model:
+    """`onto` with the weights of `model`, float32, on the CPU."""
+    onto.load_state_dict({name: value.float().cpu() for name, value in model.state_dict().items()})
+    return onto
+
+
 def warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, origin: tuple[int, int]) -> Tensor:
     """The four inputs (4, B, 3, H, W) of a group warped to its novel view by (B, 1, h, w): (B, 12, h, w)."""
     n, b, c, height, width = inputs.shape
@@ -313,8 +314,11 @@ class _BatchWarp:
 
     def luminances(self, disparity: Tensor) -> list[Tensor]:
         """See Warp."""
-        lumas = [_Place(root_tone(luminance(place.images)).unsqueeze(2), place.window) for place in self._places]
-        return list(self._warped(lumas, disparity).split(1, 1))
+        return list(self._warped(self._lumas, disparity).split(1, 1))
+
+    @cached_property
+    def _lumas(self) -> list[_Place]:
+        return [_Place(root_tone(luminance(place.images)).unsqueeze(2), place.window) for place in self._places]
 
     def _warped(self, places: Sequence[_Place], disparity: Tensor) -> Tensor:
         pieces = zip(places, disparity.split(self._batch.sizes), self._batch.offsets, self._batch.groups, strict=True)
