@@ -13,7 +13,7 @@ import numpy as np
 from imgui_bundle import ImVec4, imgui
 
 from app import panels, theme
-from app.canvas import Canvas, Colours, Frame, Target, draws_in_software
+from app.canvas import Canvas, Colours, Frame, Target, draws_in_software, spread_rasteriser
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
 from app.commands import Action, OpenPath, Request
@@ -55,6 +55,7 @@ class Interface:
         self.in_software = draws_in_software(context)
         if self.in_software:
             controller.share_processor()
+            spread_rasteriser()
         self._canvas = Canvas(context, reach=CARRIED_IN_SOFTWARE if self.in_software else CARRIED)
         self._atlas = Atlas(context)
         self._fonts = theme.apply(scale)

@@ -9,5 +9,5 @@ uniform float dim;  // 1: as it is
 layout(location = 0) out vec4 colour;
 
 void main() {
-    colour = vec4(sampled(picture, picture_point()) * dim, 1.0);
+    colour = vec4(sampled(picture, picture_point) * dim, 1.0);
 }

@@ -4,5 +4,16 @@ from app.canvas.canvas import Canvas
 from app.canvas.contexts import draws_in_software, standalone_context, windowed_context
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.magnifier import Colours
+from app.canvas.rasteriser import spread_rasteriser
 
-__all__ = ["BACKGROUND", "Canvas", "Colours", "Frame", "Target", "draws_in_software", "standalone_context", "windowed_context"]
+__all__ = [
+    "BACKGROUND",
+    "Canvas",
+    "Colours",
+    "Frame",
+    "Target",
+    "draws_in_software",
+    "spread_rasteriser",
+    "standalone_context",
+    "windowed_context",
+]

@@ -58,7 +58,7 @@ class Magnifier:
         framebuffer.viewport = (0, 0, width, height)
         framebuffer.scissor = (inside.x, height - inside.y - inside.height, inside.width, inside.height)
         framebuffer.use()
-        return {"origin": placement.origin, "scale": placement.scale, "window_height": float(height)}
+        return {"origin": placement.origin, "scale": placement.scale, "window_size": (float(width), float(height))}
 
     def _finish(self, target: Target) -> None:
         target.framebuffer.scissor = (0, 0, *target.size)

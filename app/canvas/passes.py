@@ -27,8 +27,9 @@ class Pass:
 
     def __init__(self, context: moderngl.Context, fragment: str, instead: Mapping[str, str] | None = None) -> None:
         source = glsl.load(fragment, instead)
+        vertex = "placed.vert" if "placement.glsl" in source.files else "everywhere.vert"
         try:
-            self._program = context.program(glsl.load("everywhere.vert").text, source.text)
+            self._program = context.program(glsl.load(vertex).text, source.text)
         except moderngl.Error as error:
             raise LfviewError(f"A shader does not compile on this computer: {source.located(str(error))}") from error
         self._triangle = context.vertex_array(self._program, [])

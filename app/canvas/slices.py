@@ -81,7 +81,7 @@ class Slices:
             {
                 "origin": placement.origin,
                 "scale": placement.scale,
-                "window_height": float(height),
+                "window_size": (float(width), float(height)),
                 "through": (math.floor(slicing.through[0]) + 0.5, math.floor(slicing.through[1]) + 0.5),
                 "axis": axis,
                 "start": reach[0],

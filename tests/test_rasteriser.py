@@ -1,0 +1,36 @@
+"""Where the processor draws, each thread of the rasteriser has a core of its own."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import moderngl
+import pytest
+
+from app.canvas import draws_in_software, spread_rasteriser
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="threads are given cores on Linux only")
+
+
+def _threads() -> list[int]:
+    tasks = Path("/proc/self/task").iterdir()
+    return [int(task.name) for task in tasks if (task / "comm").read_text().startswith("llvmpipe")]
+
+
+def test_threads_of_the_rasteriser_share_no_core_while_there_are_enough(gl: moderngl.Context) -> None:
+    threads = _threads()
+    if not draws_in_software(gl) or not threads:
+        pytest.skip("these graphics have no threads of llvmpipe")
+    before = {thread: os.sched_getaffinity(thread) for thread in threads}
+    mine = os.sched_getaffinity(0)
+    try:
+        assert spread_rasteriser() == len(threads)
+        cores = [os.sched_getaffinity(thread) for thread in threads]
+        assert all(len(core) == 1 and core <= mine for core in cores)
+        assert len(set.union(*cores)) == min(len(threads), len(mine))
+        assert os.sched_getaffinity(0) == mine  # no other thread is bound
+    finally:
+        for thread, allowed in before.items():
+            os.sched_setaffinity(thread, allowed)
