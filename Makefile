@@ -18,8 +18,10 @@ TEST_PACKAGES := xvfb xdotool
 DATA ?= ../shared/data
 TEXTURES ?= textures
 WEIGHTS ?= $(OUT)/weights
-# Captures as a Lytro Illum's own software stores them are three of twenty; they count three times.
-TRAINING = $(DATA)/train $(foreach name,IMG_0288 bikes_4 bikes_11,$(DATA)/train/$(name) $(DATA)/train/$(name))
+# Captures as a Lytro Illum's own software stores them are three of twenty; they count three times. The three with large
+# disparities count twice.
+TRAINING = $(DATA)/train $(foreach name,IMG_0288 bikes_4 bikes_11,$(DATA)/train/$(name) $(DATA)/train/$(name)) \
+	$(foreach name,hci_antinous hci_bicycle hci_pens,$(DATA)/train/$(name))
 TRAIN = $(PYTHON) -m app train --data $(TRAINING) --val $(DATA)/val --generated 300 --textures $(TEXTURES) \
 	--generated-share 0.4 --balance 0.75
 
@@ -56,7 +58,7 @@ clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info
 
 # The program is installed in place, in the versions of constraints.txt; touched last, so that a broken set-up is done again.
-$(VENV)/ready: pyproject.toml constraints.txt
+$(VENV)/ready: pyproject.toml constraints.txt lfcore/kernels.c
 	@$(find_python); \
 	$(make_venv); \
 	echo "Setting up in $(VENV) (once; about 1.3 GB, most of it torch) ..."; \

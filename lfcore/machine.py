@@ -1,8 +1,9 @@
-"""What a figure was measured on: processor, cores, torch."""
+"""What a figure was measured on: processor, cores, torch, and whether the kernels are compiled (lfcore.kernels)."""
 
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import os
 import platform
 import subprocess
@@ -11,10 +12,11 @@ from pathlib import Path
 
 
 def machine() -> str:
-    """One line, such as "Intel(R) Core(TM) i7-8700, 12 cores, Linux, torch 2.13.0"."""
+    """One line, such as "Intel(R) Core(TM) i7-8700, 12 cores, Linux, torch 2.13.0, kernels compiled"."""
     count = core_count()
     cores = "1 core" if count == 1 else f"{count} cores"
-    return f"{_processor()}, {cores}, {platform.system()}, torch {importlib.metadata.version('torch')}"
+    kernels = "kernels compiled" if importlib.util.find_spec("lfcore._kernels") else "kernels not compiled"
+    return f"{_processor()}, {cores}, {platform.system()}, torch {importlib.metadata.version('torch')}, {kernels}"
 
 
 def core_count() -> int:

@@ -15,6 +15,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from lfcore import kernels
 from lfcore.warp import cubic_taps
 
 # Rec. 601 luma, as MATLAB's rgb2gray has it (authors' code).
@@ -82,6 +83,25 @@ def plane_sweep(
     if out is None:
         shape = (luma.shape[1], 2 * levels.count, *window.shape)
         out = torch.empty(shape, device=luma.device, memory_format=torch.channels_last)
+    if kernels.can_sweep(luma, out):
+        _sweep_compiled(luma, offsets, levels, window, out)
+    else:
+        _sweep_by_torch(luma, offsets, levels, window, out)
+    return out
+
+
+def _sweep_compiled(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> None:
+    """`plane_sweep` by the compiled kernel."""
+    shifts = levels.values().double()[None, :, None] * offsets.double()[:, None]  # (N, L, 2), along x and y
+    whole = shifts.floor()
+    height, width = luma.shape[-2:]
+    last = torch.tensor([width - 1, height - 1], dtype=torch.float64) - shifts
+    valid = torch.stack(((-shifts).ceil(), last.floor() + 1), -1)
+    kernels.plane_sweep(luma, whole, cubic_taps(shifts - whole), valid, (window.top, window.left), out)
+
+
+def _sweep_by_torch(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> None:
+    """`plane_sweep` by operations of torch."""
     means, deviations = out.split(levels.count, 1)
     values = levels.values().double()
     for first in range(0, levels.count, _BLOCK_LEVELS):
@@ -99,7 +119,6 @@ def plane_sweep(
             columns = slice(block.left - window.left, block.right - window.left)
             means[:, chosen, rows, columns] = mean
             deviations[:, chosen, rows, columns] = deviation
-    return out
 
 
 @dataclass(frozen=True)

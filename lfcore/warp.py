@@ -11,7 +11,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from lfcore import kernels
+
 CUBIC_A = -0.5
+_TORCH_A = -0.75
 _BAND_SAMPLES = 2**18  # a warp works on bands of rows of so many samples, so that its temporaries stay small
 
 
@@ -45,6 +48,8 @@ def backward_warp(
     """
     _, _, height, width = image.shape
     x, y = _positions(disparity, offset, origin)
+    if kernels.can_sample(image, x, y):
+        return kernels.cubic_sample(image, x, y, CUBIC_A, outside=False)
     inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)  # False for NaN
     return torch.where(inside.unsqueeze(1), _cubic_sample(image, x, y), 0)
 
@@ -60,6 +65,8 @@ def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[i
 
 def quick_sample(image: Tensor, x: Tensor, y: Tensor) -> Tensor:
     """Samples of (N, C, H, W) at the positions x and y, px, each (N, h, w), by torch's own bicubic kernel: (N, C, h, w)."""
+    if kernels.can_sample(image, x, y):
+        return kernels.cubic_sample(image, x, y, _TORCH_A, outside=True)
     _, _, height, width = image.shape
     grid = torch.stack((_grid(x, width), _grid(y, height)), -1)
     return F.grid_sample(image, grid, mode="bicubic", padding_mode="border", align_corners=True)

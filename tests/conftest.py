@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from typing import Any
 
@@ -48,3 +49,16 @@ def imgui_context() -> Iterator[Any]:
     io.backend_flags |= imgui.BackendFlags_.renderer_has_textures.value
     yield imgui
     imgui.destroy_context(context)
+
+
+@pytest.fixture(params=["compiled", "torch"])
+def either_route(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the compiled kernels compute is computed by torch where there are none; a test with this runs with both."""
+    from lfcore import kernels
+
+    if request.param == "torch":
+        monkeypatch.setattr(kernels, "_KERNELS", None)
+    elif not kernels.compiled():
+        if os.environ.get("CI") and shutil.which("cc"):
+            pytest.fail("the kernels have not been compiled, though this machine has a compiler")
+        pytest.skip("this installation has no compiled kernels")

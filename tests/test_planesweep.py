@@ -8,6 +8,8 @@ from lfcore.lightfield import CORNERS
 from lfcore.planesweep import Levels, Window, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor
 
+pytestmark = pytest.mark.usefixtures("either_route")
+
 
 def random_luma(seed: int = 0, size: tuple[int, int] = (14, 17), batch: int = 1) -> torch.Tensor:
     return torch.from_numpy(np.random.default_rng(seed).random((4, batch, *size)).astype(np.float32))
@@ -49,6 +51,34 @@ def test_a_batch_is_its_members() -> None:
     together = plane_sweep(luma, offsets, Levels(), window)
     for k in range(3):
         torch.testing.assert_close(together[k : k + 1], plane_sweep(luma[:, k : k + 1], offsets, Levels(), window))
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_the_result_goes_into_the_place_it_is_given_and_nowhere_else(dtype: torch.dtype) -> None:
+    luma, levels, window = random_luma(3, (23, 37), batch=2), Levels(5, -9, 9), Window(2, 21, 1, 36)
+    offsets = corner_offsets(0.2, 0.6)
+    expected = plane_sweep(luma, offsets, levels, window)  # (2, 10, 19, 35)
+    around = torch.full((2, 13, 25, 40), 7.0, dtype=dtype).to(memory_format=torch.channels_last)
+    place = around[:, :10, 4:23, 2:37]
+    assert plane_sweep(luma, offsets, levels, window, place) is place
+    coarseness = 4e-3 if dtype is torch.bfloat16 else 1e-6
+    torch.testing.assert_close(place.float(), expected.to(dtype).float(), atol=coarseness, rtol=0)
+    place.fill_(7.0)
+    assert torch.equal(around, torch.full_like(around, 7.0))
+
+
+def test_the_number_of_threads_changes_nothing() -> None:
+    luma, levels, window = random_luma(4, (31, 33)), Levels(6, -14, 14), Window(0, 31, 0, 33)
+    before = torch.get_num_threads()
+    found = []
+    try:
+        for threads in (1, 2, 5):
+            torch.set_num_threads(threads)
+            found.append(plane_sweep(luma, corner_offsets(0.9, 0.4), levels, window))
+    finally:
+        torch.set_num_threads(before)
+    for other in found[1:]:
+        torch.testing.assert_close(other, found[0], atol=1e-6, rtol=0)
 
 
 def test_deviation_vanishes_at_the_disparity_of_a_plane() -> None:

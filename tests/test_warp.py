@@ -4,7 +4,9 @@ import torch
 from scenes import plane
 from slow import keys_kernel, sample
 
-from lfcore.warp import backward_warp, cubic_taps, quick_warp, source_offset
+from lfcore.warp import backward_warp, cubic_taps, quick_sample, quick_warp, source_offset
+
+pytestmark = pytest.mark.usefixtures("either_route")
 
 
 def test_taps_are_the_kernel_of_keys() -> None:
@@ -97,3 +99,28 @@ def test_the_quick_warp_moves_as_the_papers_warp_does() -> None:
     found = quick_warp(image, disparity, offset, (10, 10))
     expected = backward_warp(image, disparity.expand(2, -1, -1, -1), offset, (10, 10))
     torch.testing.assert_close(found, expected, atol=6e-3, rtol=0)
+
+
+def test_quick_samples_equal_a_slow_sampling_whose_edges_are_repeated() -> None:
+    rng = np.random.default_rng(6)
+    image = rng.random((2, 3, 7, 9)).astype(np.float32)
+    x = rng.uniform(-6, 15, (2, 5, 40)).astype(np.float32)
+    y = rng.uniform(-6, 13, (2, 5, 40)).astype(np.float32)
+    x[0, 0, :4], y[0, 0, :4] = (0, 8, 3, -1), (0, 6, 2, 7)  # whole pixels, the last one outside
+    found = quick_sample(*(torch.from_numpy(a) for a in (image, x, y))).numpy()
+    for n, row, column in np.ndindex(x.shape):
+        px, py = float(x[n, row, column]), float(y[n, row, column])
+        left, top = int(np.floor(px)) - 1, int(np.floor(py)) - 1
+        across = [keys_kernel(px - (left + k), -0.75) for k in range(4)]
+        down = [keys_kernel(py - (top + k), -0.75) for k in range(4)]
+        rows, columns = np.clip(np.arange(top, top + 4), 0, 6), np.clip(np.arange(left, left + 4), 0, 8)
+        expected = np.einsum("cyx,y,x->c", image[n][:, rows][:, :, columns].astype(np.float64), down, across)
+        np.testing.assert_allclose(found[n, :, row, column], expected, atol=2e-5)
+
+
+def test_a_place_that_is_not_a_number_or_far_away_is_outside() -> None:
+    image = torch.rand(1, 3, 8, 8, generator=torch.Generator().manual_seed(2))
+    disparity = torch.full((1, 1, 8, 8), 1e30)
+    disparity[..., :2], disparity[..., 2:4] = float("nan"), -float("inf")
+    warped = backward_warp(image, disparity, torch.tensor([[1.0, -1.0]]))
+    assert torch.equal(warped, torch.zeros_like(warped))

@@ -34,7 +34,7 @@ class PatchConfig:
     tone_share: float = 0.5  # patches whose tone is changed
     shear_spread: float = 6.0  # standard deviation of the disparity that a patch's scene is brought to, px
     even_share: float = 0.4  # of the patches; the disparities that their scenes are brought to are spread evenly instead,
-    even_reach: float = 15.0  # from -even_reach to even_reach, px
+    even_reach: float = 22.0  # from -even_reach to even_reach, px, as far as the levels allow
 
     def __post_init__(self) -> None:
         if self.size < 32 or self.batch < 1 or self.group < 1 or self.batch % self.group:
