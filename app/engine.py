@@ -78,9 +78,14 @@ class _Model:
         if self._light_field is not light_field:
             synthesizer.set_light_field(light_field)
             self._light_field = light_field
+        ask = synthesizer.synthesize
         if weighed and isinstance(synthesizer, WeighingSynthesizer):
-            return synthesizer.synthesize_weighed(u, v, cancelled)
-        return synthesizer.synthesize(u, v, cancelled)
+            ask = synthesizer.synthesize_weighed
+        try:
+            return ask(u, v, cancelled)
+        except WeightsError as error:  # of a model that is loaded with its first query
+            self.failure = error
+            raise
 
 
 class Engine:
@@ -151,8 +156,11 @@ class Engine:
         return self._final.synthesizer is not None and weighs(self._final.synthesizer)
 
     def quick_answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
-        """The synthesis of (u, v) by the model for a hand that moves. It is not kept: making it again is quick."""
+        """The synthesis of (u, v) by the model for a hand that moves; or that of the other where it lies on disk, which is
+        quicker still, and may be so before any model has been loaded. It is not kept: making it again is quick."""
         assert self._quick is not None
+        if self._lies_on_disk(light_field, u, v):
+            return self.answer(light_field, u, v, cancelled)
         return _answer(self._quick.synthesize(light_field, u, v, cancelled), final=False, kept=False, score=None)
 
     def answer(self, light_field: LightField, u: float, v: float, cancelled: Cancel, weighed: bool = False) -> Answer:
@@ -319,6 +327,15 @@ class Engine:
                 self._stored -= {(key.u, key.v)}  # damaged, or removed by another program
             return None
         return dataclasses.replace(synthesis, u=u, v=v)
+
+    def _lies_on_disk(self, light_field: LightField, u: float, v: float) -> bool:
+        """Whether a view by the model for a hand at rest does."""
+        if self._store is None or self._final.failure is not None:
+            return False
+        key = cache_key(light_field, self._final.prepare(), u, v)
+        if self._stored_of != (key.content, key.model):
+            self._list_stored(key)
+        return (key.u, key.v) in self._stored
 
     def _list_stored(self, key: CacheKey) -> None:
         assert self._store is not None

@@ -15,6 +15,7 @@ from lfcore.lightfield import LightField
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.store import ViewStore
 from lfcore.synthesis import Synthesizer
+from lfcore.weights_header import read_stated
 
 if TYPE_CHECKING:
     from lfcore.thumbnails import ThumbnailStore
@@ -116,4 +117,5 @@ def offered_models(model: str, process: SynthesisProcess) -> dict[str, ModelChoi
 
 def synthesizer_factory(model: str, process: SynthesisProcess) -> Callable[[], Synthesizer]:
     """What makes the synthesizer of the named model or weight file, which runs in the process, when called."""
-    return lambda: RemoteSynthesizer(process, model)
+    file = weights_path(model) if model in SHIPPED else Path(model)
+    return lambda: RemoteSynthesizer(process, model, stated=read_stated(file))

@@ -41,6 +41,7 @@ from lfcore.remote_messages import (
 )
 from lfcore.remote_server import serve, shipped_models
 from lfcore.synthesis import Synthesis, never
+from lfcore.weights_header import Stated
 
 _CANCEL_SECONDS = 0.01  # how often a waiting query looks whether it is still wanted
 _END_SECONDS = 3.0  # for the process to end by itself, before it is made to
@@ -114,6 +115,11 @@ class SynthesisProcess:
         """Load the model of that name. Raises what loading raises."""
         with self._lock:
             return self._loaded(model)
+
+    def weighs(self, model: str) -> bool:
+        """Whether a model that has been loaded can tell weights."""
+        made = self._made.get(model)
+        return made is not None and made.weighs
 
     def synthesize(
         self,
@@ -244,17 +250,23 @@ class SynthesisProcess:
 class RemoteSynthesizer:
     """A model in a SynthesisProcess; see lfcore.synthesis.Synthesizer. The warped inputs stay in the process.
 
-    shares: whether its queries leave a core to the program once SynthesisProcess.share_processor has been called. Raises
-    InputError or WeightsError where the model cannot be loaded.
+    shares: whether its queries leave a core to the program once SynthesisProcess.share_processor has been called. stated: what
+    is known of the model beforehand; then it is loaded with the first query. InputError or WeightsError is raised where
+    the model cannot be loaded.
     """
 
-    def __init__(self, process: SynthesisProcess, model: str, shares: bool = False) -> None:
+    def __init__(self, process: SynthesisProcess, model: str, shares: bool = False, stated: Stated | None = None) -> None:
         self._process = process
         self._model = model
         self._shares = shares
-        made = process.load(model)
-        self.name, self.key, self.weighs = made.name, made.key, made.weighs
+        known = stated or process.load(model)
+        self.name, self.key = known.name, known.key
         self._light_field: LightField | None = None
+
+    @property
+    def weighs(self) -> bool:
+        """See WeighingSynthesizer; not before the model has been loaded."""
+        return self._process.weighs(self._model)
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer. It is handed over, and what does not depend on (u, v) is computed, with the first query."""

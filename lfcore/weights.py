@@ -17,8 +17,8 @@ from torch import Tensor
 from lfcore.atomic import atomic_path
 from lfcore.errors import WeightsError
 from lfcore.models import Config, Model, build_model, config_from_json
+from lfcore.weights_header import FORMAT
 
-FORMAT = "lfview weights 1"
 # The paper's pair of networks takes 6.6 MB in float32; anything far beyond is no weight file of ours.
 LARGEST_FILE = 256 * 2**20
 

@@ -19,6 +19,7 @@ from lfcore.errors import InputError, WeightsError
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16
 from lfcore.store import ViewStore
+from lfcore.synthesis import Synthesis
 
 PATIENCE = 10.0
 Progress = Callable[[float], None]
@@ -443,6 +444,29 @@ def test_a_quick_model_that_cannot_be_loaded_is_said_and_the_other_serves_alone(
         program.controller.stop()
 
 
+def test_a_model_that_turns_out_damaged_with_its_first_query_is_said_once_and_the_quick_one_serves_alone() -> None:
+    class Damaged(TruthSynthesizer):
+        def synthesize(self, u: float, v: float, cancelled: Cancel = lambda: False) -> Synthesis:
+            super().synthesize(u, v, cancelled)
+            raise WeightsError("The weights of full are damaged; get them again.")
+
+    damaged, quick = Damaged(), TruthSynthesizer()
+    program = Program(damaged, quick)
+    try:
+        program.open("3x3")
+        program.until(lambda: bool(program.controller.messages))
+        assert program.controller.messages == ["The weights of full are damaged; get them again."]
+        program.controller.dismiss()
+        for u in (0.3, 0.4):
+            program.controller.state.move_to(u, 0.3)
+            program.until(lambda: program.controller.picture is not None)
+            program.tick(1.0)
+        assert program.controller.messages == []
+        assert len(damaged.asked) == 1
+    finally:
+        program.controller.stop()
+
+
 # Foresight and the disk.
 
 
@@ -531,7 +555,8 @@ def test_what_one_run_has_synthesized_the_next_one_has_at_once(tmp_path: Path) -
         first.until(lambda: ViewStore(tmp_path).usage().views == 2)
     finally:
         first.controller.stop()
-    second = Program(TruthSynthesizer(), store=ViewStore(tmp_path))
+    quick = TruthSynthesizer()
+    second = Program(TruthSynthesizer(), quick, ViewStore(tmp_path))
     try:
         second.controller.state.foresight = False
         second.open("3x3")
@@ -543,6 +568,7 @@ def test_what_one_run_has_synthesized_the_next_one_has_at_once(tmp_path: Path) -
         second.tick()
         assert second.controller.step is Step.FULL
         assert second.synthesizer.asked == []
+        assert quick.asked == []  # what lies on disk is sooner there
     finally:
         second.controller.stop()
 

@@ -24,6 +24,7 @@ from lfcore.lightfield import LightField
 from lfcore.machine import core_count
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.synthesizer import MeanSynthesizer
+from lfcore.weights_header import Stated
 
 PATIENCE = 60.0
 ROOT = Path(__file__).parents[1]
@@ -94,6 +95,21 @@ def test_models_are_asked_in_turn_about_light_fields_of_any_size(process: Synthe
     for _ in range(2):
         assert np.array_equal(first.synthesize(0, 1).image, small.corners()[1])
         assert np.array_equal(second.synthesize(1, 0).image, large.corners()[2])
+
+
+def test_a_model_whose_name_and_key_are_stated_is_loaded_with_its_first_query() -> None:
+    with SynthesisProcess(make) as process:
+        synthesizer = RemoteSynthesizer(process, "weigher", stated=Stated("told", "key told"))
+        assert (synthesizer.name, synthesizer.key, synthesizer.weighs) == ("told", "key told", False)
+        assert process.pid is None
+        field = light_field()
+        synthesizer.set_light_field(field)
+        assert np.array_equal(synthesizer.synthesize(1, 0).image, field.corners()[2])
+        assert synthesizer.weighs
+        absent = RemoteSynthesizer(process, "missing", stated=Stated("told", "key told"))
+        absent.set_light_field(field)
+        with pytest.raises(InputError, match=r"^There is no such model\.$"):
+            absent.synthesize(1, 0)
 
 
 def test_errors_surface_as_they_are(process: SynthesisProcess) -> None:
