@@ -1,5 +1,5 @@
 /* Parts of a synthesis that torch has no fast operation for. Optional: where this is not compiled, the same is computed in torch
- * (lfcore.planesweep says what, lfcore.kernels hands it over).
+ * (lfcore.planesweep and lfcore.warp say what, lfcore.kernels hands it over). For gcc and clang, whose vectors it uses.
  *
  * Threads are OpenMP's. Torch has been loaded before, so that its OpenMP is found and its threads are used: others would have to
  * wait until those stop spinning.
@@ -22,14 +22,7 @@
 #endif
 
 /* Parts of such a function must become parts of each of its versions. */
-#if defined(__GNUC__)
 #define PART static inline __attribute__((always_inline))
-#elif defined(_MSC_VER)
-#define PART static __forceinline
-#define restrict __restrict
-#else
-#define PART static inline
-#endif
 
 #define PARTS_PER_THREAD 8
 #define PIXELS_AT_ONCE 16 /* whose channels are written together: so many lines of the nearest cache */
@@ -38,7 +31,7 @@ typedef struct {
     const float *luma; /* (inputs, batch, height, width) */
     const int32_t *whole; /* (inputs, levels, 2): whole pixels of each shift along x and y */
     const float *taps; /* (inputs, levels, 2, 4): weights of the samples at -1, 0, 1, 2 past it */
-    const int32_t *valid; /* (inputs, levels, 2, 2): first place of the novel view that counts along x and y, and the one past the last */
+    const int32_t *valid; /* (inputs, levels, 2, 2): along x and y the first place that counts, and the one past the last */
     void *out; /* (batch, rows, columns, 2 levels), the last contiguous */
     Py_ssize_t inputs, batch, height, width, levels, top, left, columns;
     Py_ssize_t out_batch, out_row, out_pixel; /* strides in values */
@@ -51,7 +44,7 @@ PART Py_ssize_t within(Py_ssize_t value, Py_ssize_t size) { return at_least(at_m
 
 /* The taps along y, for `count` columns from `first` on, which may lie beyond the picture: its edge is repeated. */
 PART void taps_down(const float *picture, Py_ssize_t height, Py_ssize_t width, Py_ssize_t row, const float *taps,
-                             Py_ssize_t first, Py_ssize_t count, float *restrict result) {
+                    Py_ssize_t first, Py_ssize_t count, float *restrict result) {
     const float *a = picture + within(row, height) * width, *b = picture + within(row + 1, height) * width;
     const float *c = picture + within(row + 2, height) * width, *d = picture + within(row + 3, height) * width;
     const float ta = taps[0], tb = taps[1], tc = taps[2], td = taps[3];
@@ -73,7 +66,7 @@ PART void taps_across(const float *restrict source, const float *taps, Py_ssize_
 
 /* Mean and deviation of one row at one level, over the inputs that count at each place. */
 PART void level_row(const Sweep *sweep, Py_ssize_t k, Py_ssize_t level, Py_ssize_t y, float *restrict moved,
-                             float *restrict shifted, float *restrict counted, float *restrict mean, float *restrict deviation) {
+                    float *restrict shifted, float *restrict counted, float *restrict mean, float *restrict deviation) {
     const Py_ssize_t w = sweep->columns, left = sweep->left;
     memset(mean, 0, w * sizeof(float));
     memset(deviation, 0, w * sizeof(float));
@@ -206,8 +199,6 @@ typedef struct {
 
 /* Four neighbours along a row, or what belongs to each of them. */
 typedef float Four __attribute__((vector_size(16)));
-
-PART Four spread(float value) { return (Four){value, value, value, value}; }
 
 PART Four four_at(const float *values) {
     Four four;
