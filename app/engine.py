@@ -60,6 +60,7 @@ class _Model:
         self._light_field: LightField | None = None
         self.synthesizer: Synthesizer | None = None
         self.failure: LfviewError | None = None
+        self.has_answered = False
 
     def prepare(self) -> Synthesizer:
         """Load the model, where that has not been done; raises the same error each time where there is no such model."""
@@ -82,10 +83,12 @@ class _Model:
         if weighed and isinstance(synthesizer, WeighingSynthesizer):
             ask = synthesizer.synthesize_weighed
         try:
-            return ask(u, v, cancelled)
+            synthesis = ask(u, v, cancelled)
         except WeightsError as error:  # of a model that is loaded with its first query
             self.failure = error
             raise
+        self.has_answered = True
+        return synthesis
 
 
 class Engine:
@@ -137,8 +140,8 @@ class Engine:
 
     @property
     def ready(self) -> bool:
-        """Whether the model for a hand at rest has been loaded."""
-        return self._final.synthesizer is not None
+        """Whether a model is known to have been loaded, since it has answered."""
+        return any(model is not None and model.has_answered for model in (self._final, self._quick))
 
     @property
     def failed(self) -> bool:

@@ -444,6 +444,17 @@ def test_a_quick_model_that_cannot_be_loaded_is_said_and_the_other_serves_alone(
         program.controller.stop()
 
 
+def test_the_networks_count_as_loading_until_one_has_answered() -> None:
+    program = Program(TruthSynthesizer(seconds=0.1), TruthSynthesizer(seconds=0.1))
+    try:
+        program.open("3x3")
+        program.until(lambda: program.controller.readout(None).busy == "loading the networks", 0)
+        program.until(lambda: program.controller.readout(None).busy == "synthesizing")
+        program.until_full()
+    finally:
+        program.controller.stop()
+
+
 def test_a_model_that_turns_out_damaged_with_its_first_query_is_said_once_and_the_quick_one_serves_alone() -> None:
     class Damaged(TruthSynthesizer):
         def synthesize(self, u: float, v: float, cancelled: Cancel = lambda: False) -> Synthesis:

@@ -90,10 +90,12 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument(
         "--teacher-weight", type=positive, metavar="W", default=0.1, help="how much the teacher counts (default: 0.1)"
     )
-    parser.add_argument("--init",
+    parser.add_argument(
+        "--init",
         metavar="FILE",
         type=Path,
-        help="weights to go on from, in place of random ones; fine may begin with those of realtime")
+        help="weights to go on from, in place of random ones; fine may begin with those of realtime",
+    )
     parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
     parser.add_argument(
         "--run-dir",
