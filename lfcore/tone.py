@@ -10,14 +10,14 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-_TOE = 0.004  # one step of 8 bits: the slope of the root stays finite in the dark, where read noise rules
+TOE = 0.004  # one step of 8 bits: the slope of the root stays finite in the dark, where read noise rules
 
 
 def root_tone(stored: Tensor) -> Tensor:
     """Stored values (any shape, 1 = white; below 0 is taken as 0) to the root tone, about 0.06 to 1."""
-    return torch.sqrt(stored.clamp_min(0) + _TOE)
+    return torch.sqrt(stored.clamp_min(0) + TOE)
 
 
 def stored_from_root(toned: Tensor) -> Tensor:
     """The inverse of `root_tone` for values that it can give; differentiable everywhere."""
-    return toned.square() - _TOE
+    return toned.square() - TOE

@@ -14,7 +14,7 @@ from torch import Tensor
 from lfcore import kernels
 
 CUBIC_A = -0.5
-_TORCH_A = -0.75
+QUICK_A = -0.75  # built into torch
 _BAND_SAMPLES = 2**18  # a warp works on bands of rows of so many samples, so that its temporaries stay small
 
 
@@ -66,7 +66,7 @@ def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[i
 def quick_sample(image: Tensor, x: Tensor, y: Tensor) -> Tensor:
     """Samples of (N, C, H, W) at the positions x and y, px, each (N, h, w), by torch's own bicubic kernel: (N, C, h, w)."""
     if kernels.can_sample(image, x, y):
-        return kernels.cubic_sample(image, x, y, _TORCH_A, outside=True)
+        return kernels.cubic_sample(image, x, y, QUICK_A, outside=True)
     _, _, height, width = image.shape
     grid = torch.stack((_grid(x, width), _grid(y, height)), -1)
     return F.grid_sample(image, grid, mode="bicubic", padding_mode="border", align_corners=True)

@@ -1,0 +1,235 @@
+"""What lies beside the convolutions of the small pair (lfcore.compact), by operations of torch and by compiled kernels.
+
+The picture is kept as its four half-size phases: pixel (2 y + dy, 2 x + dx) stands at [2 dy + dx, y, x], since the disparity
+comes out so and the colour network wants it so; only the results are put together at full size. Networks' values are in
+channels_last order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from lfcore import kernels
+from lfcore.networks import INPUTS
+from lfcore.tone import TOE, stored_from_root
+from lfcore.warp import QUICK_A, quick_sample
+
+MIDDLE = 0.5  # is taken off toned pictures before they are warped, since the colour network wants them around 0
+RESIDUAL = 0.1  # what the colour network's residual counts
+PHASES = 4
+GATHERED = 64  # channels that the colour network takes
+
+
+@dataclass(frozen=True)
+class Heads:
+    """Weights of the disparity network's last steps, float32."""
+
+    score: tuple[Tensor, Tensor]  # of each level: (L, C), (L,)
+    spread: tuple[Tensor, Tensor]  # of nine neighbours for each phase: (36, C), (36,), by phase, then neighbour
+    values: Tensor  # (L,), px
+    sharpness: float  # how steeply a level's score falls with its deviation
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """The warped inputs."""
+
+    channels: Tensor  # (1, 64, h, w): what the colour network takes, in the order of `gathered_order`
+    warped: Tensor  # as the parts that made it want it again
+
+
+class Parts(Protocol):
+    """One way to compute them."""
+
+    def prepared(self, corners: Tensor) -> Tensor:
+        """Corner views (4, 3, H, W) in the root tone less MIDDLE, continued by `reach`, as `gathered` takes them."""
+
+    def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
+        """Hidden channels (1, C, h, w), not negative, and features of the sweep (1, 2 L, h, w) to phases (4, h, w), px."""
+
+    def gathered(
+        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float], dtype: torch.dtype
+    ) -> Gathered:
+        """The corners warped by the phases of the disparity; offsets: (4, 2), p_i - q; position: as the network takes it."""
+
+    def blended(
+        self, outputs: tuple[Tensor, Tensor, Tensor], warped: Tensor, nearness: Tensor, size: tuple[int, int]
+    ) -> Tensor:
+        """The picture (*size, 3), stored values within 0 and 1. outputs: scores of the inputs (1, 16, h, w) by input, then
+        phase, and two residuals (1, 12, h, w) by phase, then channel. nearness: (4,), added to the scores."""
+
+    def pictures(self, warped: Tensor) -> Tensor:
+        """The warped inputs of a Gathered at full size, (4, 3, 2 h, 2 w), in the root tone."""
+
+
+def gathered_order() -> Tensor:
+    """Which channel of lfcore.compact's colour network stands at each of the 64 places: by phase, then the mean and the inputs,
+    then colour, where that one has all means by colour, then phase, and then the inputs in the same way."""
+    theirs = torch.arange(60).view(1 + INPUTS, 3, PHASES)
+    return torch.cat((theirs.permute(2, 0, 1).flatten(), torch.arange(60, GATHERED)))
+
+
+def full_size(phases: Tensor) -> Tensor:
+    """(..., 4, h, w) -> (..., 2 h, 2 w), contiguous."""
+    *leading, _, h, w = phases.shape
+    result = torch.empty(*leading, 2 * h, 2 * w)
+    for phase in range(PHASES):
+        result[..., phase // 2 :: 2, phase % 2 :: 2] = phases[..., phase, :, :]
+    return result
+
+
+class CompiledParts:
+    """See Parts: by lfcore.kernels."""
+
+    def __init__(self, heads: Heads) -> None:
+        self._score, self._values = _filled(heads)
+        self._spread = _by_neighbour(heads.spread)
+        self._sharpness = heads.sharpness
+
+    def prepared(self, corners: Tensor) -> Tensor:
+        """(4, H, W, 4): the colours of a pixel, and one value more, side by side."""
+        return F.pad(corners.permute(0, 2, 3, 1), (0, 1)).contiguous()
+
+    def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
+        return kernels.compact_disparity(pixels, features, self._score, self._values, self._spread, self._sharpness)
+
+    def gathered(
+        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float], dtype: torch.dtype
+    ) -> Gathered:
+        return Gathered(*kernels.compact_warp(corners, disparity, offsets, reach, QUICK_A, position, dtype))
+
+    def blended(
+        self, outputs: tuple[Tensor, Tensor, Tensor], warped: Tensor, nearness: Tensor, size: tuple[int, int]
+    ) -> Tensor:
+        return kernels.compact_blend(outputs, warped, nearness, size, (MIDDLE, RESIDUAL, TOE))
+
+    def pictures(self, warped: Tensor) -> Tensor:
+        return full_size(warped[..., :3].permute(3, 4, 2, 0, 1)) + MIDDLE
+
+
+def _filled(heads: Heads) -> tuple[tuple[Tensor, Tensor], Tensor]:
+    """The matrix of scores (C, P), its bias and the values, filled up to a multiple of 16 by levels that are never chosen."""
+    matrix, bias = heads.score
+    more = -len(bias) % 16
+    return (F.pad(matrix.T, (0, more)).contiguous(), F.pad(bias, (0, more), value=-1e30)), F.pad(heads.values, (0, more))
+
+
+def _by_neighbour(spread: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+    """Matrix (C, 48) and bias, by neighbour, then phase, filled up."""
+    matrix, bias = spread
+    order = torch.arange(len(bias)).view(PHASES, -1).T.flatten()
+    more = -len(bias) % 16
+    return F.pad(matrix[order].T, (0, more)).contiguous(), F.pad(bias[order], (0, more))
+
+
+class TorchParts:
+    """See Parts: by operations of torch. Scores and weights are one matrix product each, in float32."""
+
+    def __init__(self, heads: Heads) -> None:
+        self._heads = heads
+
+    def prepared(self, corners: Tensor) -> Tensor:
+        """As they are."""
+        return corners
+
+    def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
+        _, _, h, w = pixels.shape
+        heads, levels = self._heads, len(self._heads.values)
+        rows = pixels.permute(0, 2, 3, 1).reshape(h * w, -1).float()  # (h w, C)
+        agreement = _box(features[:, levels:].to(torch.float32, memory_format=torch.channels_last))
+        scores = torch.addmm(heads.score[1], rows, heads.score[0].T)  # (h w, L)
+        scores.sub_(agreement.permute(0, 2, 3, 1).reshape(h * w, -1), alpha=heads.sharpness)
+        coarse = (scores.softmax(1) @ heads.values).view(1, 1, h, w)
+        padded = F.pad(coarse, (1, 1, 1, 1), mode="replicate")[0, 0]
+        near = torch.stack([padded[y : y + h, x : x + w] for y in range(3) for x in range(3)])  # (9, h, w)
+        weights = torch.addmm(heads.spread[1][:, None], heads.spread[0], rows.T).view(PHASES, 9, h, w).softmax(1)
+        return weights.mul_(near).sum(1)
+
+    def gathered(
+        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float], dtype: torch.dtype
+    ) -> Gathered:
+        """`warped` is (4, 3, 4, h, w), by input, channel and phase."""
+        _, h, w = disparity.shape
+        warped = _warped_phases(corners, disparity, offsets, reach)
+        mean = warped.mean(0)  # (3, 4, h, w)
+        channels = torch.empty(1, GATHERED, h, w, dtype=dtype)
+        colours = channels[0, :60].view(PHASES, 1 + INPUTS, 3, h, w)
+        colours[:, 0] = mean.transpose(0, 1)
+        colours[:, 1:] = (warped - mean).permute(2, 0, 1, 3, 4)
+        channels[0, 60:62] = torch.tensor(position).view(2, 1, 1)
+        channels[0, 62] = disparity.mean(0)
+        channels[0, 63] = _widest(disparity.amax(0)) + _widest(-disparity.amin(0))
+        return Gathered(channels.contiguous(memory_format=torch.channels_last), warped)
+
+    def blended(
+        self, outputs: tuple[Tensor, Tensor, Tensor], warped: Tensor, nearness: Tensor, size: tuple[int, int]
+    ) -> Tensor:
+        logits, residual, straight = outputs
+        shares = input_shares(logits, nearness)  # (4, 4, h, w)
+        added = planes(residual + straight).view(PHASES, 3, *shares.shape[2:]).transpose(0, 1)  # (3, 4, h, w)
+        toned = added.mul_(RESIDUAL).add_(MIDDLE)
+        for share, part in zip(shares, warped, strict=True):
+            toned.addcmul_(share, part)
+        image = full_size(stored_from_root(toned).clamp_(0, 1))
+        return image[:, : size[0], : size[1]].permute(1, 2, 0).contiguous()
+
+    def pictures(self, warped: Tensor) -> Tensor:
+        return full_size(warped) + MIDDLE
+
+
+def input_shares(logits: Tensor, nearness: Tensor) -> Tensor:
+    """Scores (1, 16, h, w) of the inputs, by input, then phase, to weights (4, 4, h, w) whose sum over the inputs is 1."""
+    values = planes(logits).view(INPUTS, PHASES, *logits.shape[2:])
+    return (values + nearness.view(INPUTS, 1, 1, 1)).softmax(0)
+
+
+def planes(values: Tensor) -> Tensor:
+    """float32 in torch's usual order."""
+    return values.contiguous().float()
+
+
+def _warped_phases(corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int) -> Tensor:
+    """The inputs (4, 3, ., .), continued by `reach`, warped by the phases (4, h, w) of a disparity: (4, 3, 4, h, w)."""
+    _, h, w = disparity.shape
+    phase = torch.arange(PHASES).view(PHASES, 1, 1)
+    rows = (2 * torch.arange(h).view(1, h, 1) + phase // 2 + reach).float()  # (4, h, 1)
+    columns = (2 * torch.arange(w).view(1, 1, w) + phase % 2 + reach).float()
+    du, dv = offsets.view(INPUTS, 2, 1, 1, 1).unbind(1)
+    x = torch.addcmul(columns, du, disparity).view(INPUTS, PHASES * h, w)
+    y = torch.addcmul(rows, dv, disparity).view(INPUTS, PHASES * h, w)
+    return quick_sample(corners, x, y).view(INPUTS, 3, PHASES, h, w)
+
+
+def _box(values: Tensor) -> Tensor:
+    """Mean over 5 x 5, at the edges over what there is. A convolution is four times as fast as torch's pooling here."""
+    channels, height, width = values.shape[1:]
+    sums = F.conv2d(values, torch.ones(channels, 1, 5, 5), padding=2, groups=channels)
+    return sums.div_(_neighbours(height).unsqueeze(1) * _neighbours(width))
+
+
+def _neighbours(size: int) -> Tensor:
+    """How many of five places around each lie within the size."""
+    places = torch.arange(size)
+    return ((places + 3).clamp(max=size) - (places - 2).clamp(min=0)).float()
+
+
+def _widest(values: Tensor) -> Tensor:
+    """The greatest of 3 x 3, at the edges of what there is: (h, w). Torch's pooling of one plane takes ten times as long."""
+    for dim in (0, 1):
+        size = values.shape[dim]
+        greatest = values.clone()
+        after, before = greatest.narrow(dim, 1, size - 1), greatest.narrow(dim, 0, size - 1)
+        torch.maximum(after, values.narrow(dim, 0, size - 1), out=after)
+        torch.maximum(before, values.narrow(dim, 1, size - 1), out=before)
+        values = greatest
+    return values
+
+
+def parts_of(heads: Heads) -> Parts:
+    """The fastest way there is here."""
+    return CompiledParts(heads) if kernels.compiled() else TorchParts(heads)

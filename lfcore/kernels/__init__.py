@@ -1,0 +1,179 @@
+"""Parts of a synthesis in C, for which torch has no fast operation. They are compiled when the package is installed, where
+there is a compiler; elsewhere the same is computed in torch, more slowly.
+
+What is computed is said in the modules that call this one; here it is handed over, as torch keeps it in memory. All tensors are
+on the CPU.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import torch
+from torch import Tensor
+
+
+def _compiled() -> ModuleType | None:
+    try:
+        from lfcore import _kernels  # type: ignore[attr-defined]
+    except ImportError:
+        return None
+    return _kernels
+
+
+_KERNELS = _compiled()
+
+
+def compiled() -> bool:
+    """Whether they are there."""
+    return _KERNELS is not None
+
+
+def can_sweep(luma: Tensor, out: Tensor) -> bool:
+    """Whether `plane_sweep` takes these arguments."""
+    return (
+        _KERNELS is not None
+        and luma.device.type == out.device.type == "cpu"
+        and luma.dtype == torch.float32
+        and out.dtype in (torch.float32, torch.bfloat16)
+        and out.stride(1) == 1
+        and not (luma.requires_grad and torch.is_grad_enabled())
+    )
+
+
+def plane_sweep(luma: Tensor, whole: Tensor, taps: Tensor, valid: Tensor, corner: tuple[int, int], out: Tensor) -> None:
+    """Mean and deviation at each of L levels over the N inputs (N, B, H, W) that count there.
+
+    whole: (N, L, 2), whole pixels of the shift of each input and level along x and y. taps: (N, L, 2, 4), the weights of the
+    samples at -1, 0, 1, 2 past it; samples beyond an edge repeat it. valid: (N, L, 2, 2), of the novel view's columns and rows
+    the first that counts and the one past the last. corner: (top, left), the place in the novel view of the first pixel
+    of `out`, (B, 2 L, h, w), channels side by side: the L means, then the L deviations. Arguments as `can_sweep` wants them.
+    """
+    assert _KERNELS is not None
+    luma, taps = luma.contiguous(), taps.float().contiguous()
+    whole, valid = whole.int().contiguous(), valid.int().contiguous()
+    inputs, batch, height, width = luma.shape
+    levels, rows, columns = out.shape[1] // 2, *out.shape[2:]
+    assert whole.shape == (inputs, levels, 2) and taps.shape == (inputs, levels, 2, 4) and valid.shape == (inputs, levels, 2, 2)
+    assert out.shape[0] == batch
+    tables = (luma.data_ptr(), whole.data_ptr(), taps.data_ptr(), valid.data_ptr(), out.data_ptr())
+    sizes = (inputs, batch, height, width, levels, *corner, rows, columns)
+    layout = (out.stride(0), out.stride(2), out.stride(3), out.dtype == torch.bfloat16)
+    _KERNELS.plane_sweep(*tables, *sizes, *layout, torch.get_num_threads())
+
+
+def can_sample(images: Tensor, x: Tensor, y: Tensor) -> bool:
+    """Whether `cubic_sample` takes these arguments."""
+    return _KERNELS is not None and all(
+        part.device.type == "cpu" and part.dtype == torch.float32 and not (part.requires_grad and torch.is_grad_enabled())
+        for part in (images, x, y)
+    )
+
+
+def cubic_sample(images: Tensor, x: Tensor, y: Tensor, a: float, outside: bool) -> Tensor:
+    """Keys' cubic interpolation of images (N, C, H, W) at the places x and y, px, each (N, ...): (N, C, ...).
+
+    a: of the kernel. outside: whether places outside the picture give its edge, repeated; else they give 0. A place that is
+    not a number counts as outside. Arguments as `can_sample` wants them.
+    """
+    assert _KERNELS is not None and x.shape == y.shape and x.shape[0] == images.shape[0]
+    images, x, y = images.contiguous(), x.contiguous(), y.contiguous()
+    count, channels, height, width = images.shape
+    out = torch.empty(count, channels, *x.shape[1:])
+    places = x[0].numel() if count else 0
+    addresses = (images.data_ptr(), x.data_ptr(), y.data_ptr(), out.data_ptr())
+    _KERNELS.cubic_sample(*addresses, count, channels, height, width, places, a, outside, torch.get_num_threads())
+    return out
+
+
+def compact_disparity(
+    pixels: Tensor,
+    features: Tensor,
+    score: tuple[Tensor, Tensor],
+    values: Tensor,
+    spread: tuple[Tensor, Tensor],
+    sharpness: float,
+) -> Tensor:
+    """The last steps of lfcore.compact.CompactDisparity, from its hidden channels to the four phases of the disparity.
+
+    pixels: (1, C, h, w), not negative, and features: (1, 2 L, h, w) of the sweep, both channels_last and of one type,
+    bfloat16 or float32. score: matrix (C, P) and bias (P,) float32, where P is a multiple of 16, not less than L; what goes
+    beyond L must have a bias that is never chosen. values: (P,) float32, px. spread: matrix (C, 48) and bias (48,) float32:
+    column 4 k + phase is the score of neighbour k of nine, columns from 36 on do not count. Returns (4, h, w) float32, px.
+    """
+    assert _KERNELS is not None
+    _, channels, height, width = pixels.shape
+    levels, outputs = features.shape[1] // 2, values.numel()
+    assert features.shape == (1, 2 * levels, height, width) and levels <= outputs and outputs % 16 == 0
+    assert score[0].shape == (channels, outputs) and spread[0].shape == (channels, 48)
+    _check((pixels, features), (*score, values, *spread))
+    coarse, disparity = torch.empty(height, width), torch.empty(4, height, width)
+    parts = (pixels, features, *score, values, *spread, coarse, disparity)
+    sizes = (height, width, channels, levels, outputs)
+    _KERNELS.compact_disparity(*_addresses(parts), *sizes, sharpness, pixels.dtype == torch.bfloat16, torch.get_num_threads())
+    return disparity
+
+
+def compact_warp(
+    corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, a: float, position: tuple[float, float], dtype: torch.dtype
+) -> tuple[Tensor, Tensor]:
+    """The inputs warped by the phases of a disparity, and with it what lfcore.compact.CompactColour begins with.
+
+    corners: (4, H, W, 4) float32, three channels and one that does not count, continued by `reach` px beyond the edges, at
+    least two. disparity: (4, h, w) float32, px. offsets: (4, 2) float32, p_i - q. a: of the cubic kernel. position: as the
+    network takes it. Returns (1, 64, h, w) in channels_last order and of `dtype`, by phase: means and the differences from
+    them of the four inputs, three channels each; then the position, the mean disparity and how far it spreads; and the warped
+    inputs, (h, w, 4, 4, 4) by phase, input and channel, the fourth of which does not count.
+    """
+    assert _KERNELS is not None
+    _, height, width = disparity.shape
+    assert corners.shape[0] == corners.shape[3] == 4 and min(corners.shape[1:3]) >= 4 and reach >= 2
+    assert disparity.shape[0] == 4 and offsets.shape == (4, 2)
+    offsets = offsets.contiguous()
+    _check((), (corners, disparity, offsets))
+    gathered = torch.empty(1, 64, height, width, dtype=dtype, memory_format=torch.channels_last)
+    warped = torch.empty(height, width, 4, 4, 4)
+    sizes = (*corners.shape[1:3], height, width, reach)
+    parts = _addresses((corners, disparity, offsets, gathered, warped))
+    _KERNELS.compact_warp(*parts, *sizes, a, *position, dtype == torch.bfloat16, torch.get_num_threads())
+    return gathered, warped
+
+
+def compact_blend(
+    outputs: tuple[Tensor, Tensor, Tensor],
+    warped: Tensor,
+    nearness: Tensor,
+    size: tuple[int, int],
+    scales: tuple[float, float, float],
+) -> Tensor:
+    """The last steps of lfcore.compact.CompactColour: the warped inputs, each with its weight, and the residual.
+
+    outputs: what comes out of the layers, all (1, ., h, w) channels_last, of one type, bfloat16 or float32: 16 scores by
+    input, then phase, and twice 12 channels of the residual by phase, then channel, which are added up. warped: as
+    `compact_warp` returns it. nearness: (4,) float32, added to the inputs' scores. size: of the picture, at most (2 h, 2 w).
+    scales: what was taken off the warped inputs, what the residual counts, and the toe of the root tone. Returns (height,
+    width, 3) float32, stored values.
+    """
+    assert _KERNELS is not None
+    logits, residual, straight = outputs
+    _, _, height, width = logits.shape
+    assert logits.shape[1] == 16 and residual.shape == straight.shape == (1, 12, height, width)
+    assert warped.shape == (height, width, 4, 4, 4) and nearness.shape == (4,)
+    assert size[0] <= 2 * height and size[1] <= 2 * width
+    _check(outputs, (warped, nearness))
+    picture = torch.empty(*size, 3)
+    parts = _addresses((*outputs, warped, nearness, picture))
+    _KERNELS.compact_blend(*parts, height, width, *size, *scales, logits.dtype == torch.bfloat16, torch.get_num_threads())
+    return picture
+
+
+def _check(of_networks: tuple[Tensor, ...], others: tuple[Tensor, ...]) -> None:
+    """Raises AssertionError where memory is not as the C code takes it to be."""
+    for part in of_networks:
+        assert part.is_contiguous(memory_format=torch.channels_last) and part.dtype == of_networks[0].dtype
+        assert part.dtype in (torch.float32, torch.bfloat16)
+    assert all(part.is_contiguous() and part.dtype == torch.float32 for part in others)
+
+
+def _addresses(parts: tuple[Tensor, ...]) -> tuple[int, ...]:
+    return tuple(part.data_ptr() for part in parts)

@@ -1,0 +1,16 @@
+/* The module lfcore._kernels. */
+#include "common.h"
+
+static PyMethodDef methods[] = {
+    {"plane_sweep", plane_sweep, METH_VARARGS, NULL},
+    {"cubic_sample", cubic_sample, METH_VARARGS, NULL},
+    {"compact_disparity", compact_disparity, METH_VARARGS, NULL},
+    {"compact_warp", compact_warp, METH_VARARGS, NULL},
+    {"compact_blend", compact_blend, METH_VARARGS, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+static struct PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT, "lfcore._kernels", "Called through lfcore.kernels alone.", 0, methods, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit__kernels(void) { return PyModule_Create(&definition); }

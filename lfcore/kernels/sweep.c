@@ -1,0 +1,151 @@
+/* The plane sweep: mean and deviation of shifted inputs (lfcore.planesweep). */
+#include "common.h"
+
+#define PIXELS_AT_ONCE 16 /* whose channels are written together: so many lines of the nearest cache */
+
+typedef struct {
+    const float *luma; /* (inputs, batch, height, width) */
+    const int32_t *whole; /* (inputs, levels, 2): whole pixels of each shift along x and y */
+    const float *taps; /* (inputs, levels, 2, 4): weights of the samples at -1, 0, 1, 2 past it */
+    const int32_t *valid; /* (inputs, levels, 2, 2): along x and y the first place that counts, and the one past the last */
+    void *out; /* (batch, rows, columns, 2 levels), the last contiguous */
+    Py_ssize_t inputs, batch, height, width, levels, top, left, columns;
+    Py_ssize_t out_batch, out_row, out_pixel; /* strides in values */
+    int halved; /* whether `out` is bfloat16, not float32 */
+} Sweep;
+
+/* The taps along y, for `count` columns from `first` on, which may lie beyond the picture: its edge is repeated. */
+PART void taps_down(const float *picture, Py_ssize_t height, Py_ssize_t width, Py_ssize_t row, const float *taps,
+                    Py_ssize_t first, Py_ssize_t count, float *restrict result) {
+    const float *a = picture + within(row, height) * width, *b = picture + within(row + 1, height) * width;
+    const float *c = picture + within(row + 2, height) * width, *d = picture + within(row + 3, height) * width;
+    const float ta = taps[0], tb = taps[1], tc = taps[2], td = taps[3];
+    Py_ssize_t begin = at_most(at_least(-first, 0), count), end = at_least(at_most(width - first, count), begin);
+    for (Py_ssize_t x = begin; x < end; ++x) {
+        const Py_ssize_t s = first + x;
+        result[x] = ta * a[s] + tb * b[s] + tc * c[s] + td * d[s];
+    }
+    for (Py_ssize_t x = 0; x < begin; ++x) result[x] = ta * a[0] + tb * b[0] + tc * c[0] + td * d[0];
+    for (Py_ssize_t x = end; x < count; ++x)
+        result[x] = ta * a[width - 1] + tb * b[width - 1] + tc * c[width - 1] + td * d[width - 1];
+}
+
+PART void taps_across(const float *restrict source, const float *taps, Py_ssize_t count, float *restrict result) {
+    const float ta = taps[0], tb = taps[1], tc = taps[2], td = taps[3];
+    for (Py_ssize_t x = 0; x < count; ++x)
+        result[x] = ta * source[x] + tb * source[x + 1] + tc * source[x + 2] + td * source[x + 3];
+}
+
+/* Mean and deviation of one row at one level, over the inputs that count at each place. */
+PART void level_row(const Sweep *sweep, Py_ssize_t k, Py_ssize_t level, Py_ssize_t y, float *restrict moved,
+                    float *restrict shifted, float *restrict counted, float *restrict mean, float *restrict deviation) {
+    const Py_ssize_t w = sweep->columns, left = sweep->left;
+    memset(mean, 0, w * sizeof(float));
+    memset(deviation, 0, w * sizeof(float));
+    memset(counted, 0, w * sizeof(float));
+    for (Py_ssize_t n = 0; n < sweep->inputs; ++n) {
+        const Py_ssize_t place = n * sweep->levels + level;
+        const int32_t *valid = sweep->valid + 4 * place, *whole = sweep->whole + 2 * place;
+        const float *taps = sweep->taps + 8 * place;
+        if (y < valid[2] || y >= valid[3]) continue;
+        const Py_ssize_t begin = at_least(valid[0] - left, 0), end = at_most(valid[1] - left, w);
+        if (end <= begin) continue;
+        const float *picture = sweep->luma + (n * sweep->batch + k) * sweep->height * sweep->width;
+        taps_down(picture, sweep->height, sweep->width, y + whole[1] - 1, taps + 4, left + begin + whole[0] - 1, end - begin + 3,
+                  moved);
+        float *restrict here = shifted + n * w;
+        taps_across(moved, taps, end - begin, here + begin);
+        for (Py_ssize_t x = begin; x < end; ++x) {
+            mean[x] += here[x];
+            counted[x] += 1.0f;
+        }
+    }
+    for (Py_ssize_t x = 0; x < w; ++x) mean[x] /= counted[x] > 1.0f ? counted[x] : 1.0f;
+    for (Py_ssize_t n = 0; n < sweep->inputs; ++n) {
+        const int32_t *valid = sweep->valid + 4 * (n * sweep->levels + level);
+        if (y < valid[2] || y >= valid[3]) continue;
+        const Py_ssize_t begin = at_least(valid[0] - left, 0), end = at_most(valid[1] - left, w);
+        const float *restrict here = shifted + n * w;
+        for (Py_ssize_t x = begin; x < end; ++x) {
+            const float away = here[x] - mean[x];
+            deviation[x] += away * away;
+        }
+    }
+    for (Py_ssize_t x = 0; x < w; ++x)
+        deviation[x] = sqrtf(deviation[x] / (counted[x] > 2.0f ? counted[x] - 1.0f : 1.0f));
+}
+
+/* Rows of channels (channels, w), an even number of them, to pixels of channels. */
+PART void write_halved(const float *restrict rows, Py_ssize_t channels, Py_ssize_t w, uint16_t *out, Py_ssize_t pixel) {
+    for (Py_ssize_t first = 0; first < w; first += PIXELS_AT_ONCE) {
+        const Py_ssize_t end = at_most(first + PIXELS_AT_ONCE, w);
+        for (Py_ssize_t c = 0; c < channels; c += 2) {
+            const float *restrict low = rows + c * w, *restrict high = low + w;
+            for (Py_ssize_t x = first; x < end; ++x) {
+                const uint16_t pair[2] = {(uint16_t)rounded(bits_of(low[x])), (uint16_t)rounded(bits_of(high[x]))};
+                memcpy(out + x * pixel + c, pair, sizeof pair);
+            }
+        }
+    }
+}
+
+PART void write_whole(const float *restrict rows, Py_ssize_t channels, Py_ssize_t w, float *out, Py_ssize_t pixel) {
+    for (Py_ssize_t first = 0; first < w; first += PIXELS_AT_ONCE) {
+        const Py_ssize_t end = at_most(first + PIXELS_AT_ONCE, w);
+        for (Py_ssize_t c = 0; c < channels; ++c)
+            for (Py_ssize_t x = first; x < end; ++x) out[x * pixel + c] = rows[c * w + x];
+    }
+}
+
+/* Rows `begin` to `end` of the window; 0, or -1 where there is no memory. */
+MANY_PROCESSORS
+static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
+    const Py_ssize_t w = sweep->columns, channels = 2 * sweep->levels;
+    float *moved = malloc(((w + 3) + w + sweep->inputs * w + channels * w) * sizeof(float));
+    if (moved == NULL) return -1;
+    float *counted = moved + w + 3, *shifted = counted + w, *rows = shifted + sweep->inputs * w;
+    for (Py_ssize_t k = 0; k < sweep->batch; ++k)
+        for (Py_ssize_t y = begin; y < end; ++y) {
+            for (Py_ssize_t level = 0; level < sweep->levels; ++level)
+                level_row(sweep, k, level, sweep->top + y, moved, shifted, counted, rows + level * w,
+                          rows + (sweep->levels + level) * w);
+            const Py_ssize_t place = k * sweep->out_batch + y * sweep->out_row;
+            if (sweep->halved)
+                write_halved(rows, channels, w, (uint16_t *)sweep->out + place, sweep->out_pixel);
+            else
+                write_whole(rows, channels, w, (float *)sweep->out + place, sweep->out_pixel);
+        }
+    free(moved);
+    return 0;
+}
+
+static int sweep_all(const Sweep *sweep, Py_ssize_t rows, int threads) {
+    const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, rows);
+    int failed = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(| : failed)
+    for (Py_ssize_t part = 0; part < parts; ++part)
+        failed |= sweep_rows(sweep, rows * part / parts, rows * (part + 1) / parts);
+    return failed;
+}
+
+PyObject *plane_sweep(PyObject *Py_UNUSED(module), PyObject *arguments) {
+    Sweep sweep;
+    unsigned long long luma, whole, taps, valid, out;
+    Py_ssize_t rows;
+    int threads;
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnnnpi", &luma, &whole, &taps, &valid, &out, &sweep.inputs, &sweep.batch,
+                          &sweep.height, &sweep.width, &sweep.levels, &sweep.top, &sweep.left, &rows, &sweep.columns,
+                          &sweep.out_batch, &sweep.out_row, &sweep.out_pixel, &sweep.halved, &threads))
+        return NULL;
+    sweep.luma = at_address(luma);
+    sweep.whole = at_address(whole);
+    sweep.taps = at_address(taps);
+    sweep.valid = at_address(valid);
+    sweep.out = at_address(out);
+    int failed;
+    Py_BEGIN_ALLOW_THREADS
+    failed = sweep_all(&sweep, rows, threads);
+    Py_END_ALLOW_THREADS
+    if (failed) return PyErr_NoMemory();
+    Py_RETURN_NONE;
+}
