@@ -141,10 +141,6 @@ class Controller:
         self.exports.stop(STOP_SECONDS)
         self.comparing.stop()
 
-    def share_processor(self) -> None:
-        """The graphics draw on the processor: from now on a core is left to them while the hand moves."""
-        self._engine.share_processor()
-
     # Once a frame.
 
     def tick(self, now: float) -> None:

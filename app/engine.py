@@ -97,7 +97,7 @@ class Engine:
 
     `make_synthesizer`: the model for a hand at rest, which `use` finds again by `name`, and in whose place it puts others.
     `make_quick`: a faster one for a hand that moves; without it the first serves both. `store`: where views of the first are
-    kept on disk. `share_processor`: makes the quick model leave a core to the graphics, where these have no GPU.
+    kept on disk.
     """
 
     def __init__(
@@ -107,10 +107,8 @@ class Engine:
         make_quick: MakeSynthesizer | None = None,
         store: ViewStore | None = None,
         name: str = "",
-        share_processor: Callable[[], None] = lambda: None,
     ) -> None:
         self.cache = SynthesisCache(cache_bytes)
-        self.share_processor = share_processor
         self._final = _Model(make_synthesizer)
         self._models = {name: self._final}  # by name; those that have been used
         self._stands_in = True  # whether the quick model may serve in place of the other

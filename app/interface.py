@@ -54,7 +54,6 @@ class Interface:
         self.closing = False
         self.in_software = draws_in_software(context)
         if self.in_software:
-            controller.share_processor()
             spread_rasteriser()
         self._canvas = Canvas(context, reach=CARRIED_IN_SOFTWARE if self.in_software else CARRIED)
         self._atlas = Atlas(context)

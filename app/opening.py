@@ -97,9 +97,9 @@ def synthesis_process() -> SynthesisProcess:
 
 def make_engine(model: str, cache_bytes: int, process: SynthesisProcess, store: ViewStore | None = None) -> Engine:
     """The engine on the named model or weight file. While the hand moves, the small networks stand in for larger ones."""
-    quick = (lambda: RemoteSynthesizer(process, QUICK, shares=True)) if weights_path(QUICK).is_file() else None
+    quick = (lambda: RemoteSynthesizer(process, QUICK)) if weights_path(QUICK).is_file() else None
     make = synthesizer_factory(model, process)
-    engine = Engine(make, cache_bytes, quick, store, Path(model).name, process.share_processor)
+    engine = Engine(make, cache_bytes, quick, store, Path(model).name)
     engine.use(Path(model).name, make, is_slow(model))
     return engine
 

@@ -24,7 +24,6 @@ import numpy as np
 
 from lfcore.errors import Cancelled, InputError, LfviewError
 from lfcore.lightfield import CORNERS, LightField
-from lfcore.machine import core_count
 from lfcore.remote_messages import (
     Cancel,
     Exchange,
@@ -69,8 +68,6 @@ class SynthesisProcess:
         self._made: dict[str, Made] = {}  # models that the running process has loaded
         self._light_field: LightField | None = None  # what it has taken
         self._number = 0  # of the latest query
-        self._cores = core_count()
-        self._spared = 0  # cores that are left to others by queries that share
 
     def __enter__(self) -> SynthesisProcess:
         return self
@@ -82,10 +79,6 @@ class SynthesisProcess:
         """Start the process now, where that has not been done: it loads torch at once. The first query would do it else."""
         with self._lock:
             self._running()
-
-    def share_processor(self) -> None:
-        """From now on queries that share leave a core to the program, where there is more than one."""
-        self._spared = 1
 
     def close(self) -> None:
         """End the process; a query that another thread waits for fails. The next query would start another."""
@@ -129,11 +122,9 @@ class SynthesisProcess:
         cancelled: Callable[[], bool],
         *,
         weighed: bool,
-        shares: bool,
     ) -> Synthesis:
         """The view at (u, v), with weights where that is wished and the model has them; see WeighingSynthesizer.
 
-        shares: see `share_processor`.
         Raises what the synthesizer raises, and LfviewError if the process has ended by itself.
         """
         u, v = at
@@ -144,8 +135,7 @@ class SynthesisProcess:
             made = self._loaded(model)
             exchange = self._handed_over(light_field)
             self._number += 1
-            threads = max(self._cores - self._spared, 1) if shares else self._cores
-            finished = self._ask(Synthesize(self._number, model, u, v, threads, weighed), Finished, cancelled)
+            finished = self._ask(Synthesize(self._number, model, u, v, weighed), Finished, cancelled)
             disparity = exchange.disparity.copy() if finished.has_disparity else None
             weights = exchange.weights.copy() if finished.has_weights else None
             return Synthesis(u, v, made.name, exchange.image.copy(), disparity, None, finished.timings, weights)
@@ -250,15 +240,13 @@ class SynthesisProcess:
 class RemoteSynthesizer:
     """A model in a SynthesisProcess; see lfcore.synthesis.Synthesizer. The warped inputs stay in the process.
 
-    shares: whether its queries leave a core to the program once SynthesisProcess.share_processor has been called. stated: what
-    is known of the model beforehand; then it is loaded with the first query. InputError or WeightsError is raised where
-    the model cannot be loaded.
+    stated: what is known of the model beforehand; then it is loaded with the first query. InputError or WeightsError is raised
+    where the model cannot be loaded.
     """
 
-    def __init__(self, process: SynthesisProcess, model: str, shares: bool = False, stated: Stated | None = None) -> None:
+    def __init__(self, process: SynthesisProcess, model: str, stated: Stated | None = None) -> None:
         self._process = process
         self._model = model
-        self._shares = shares
         known = stated or process.load(model)
         self.name, self.key = known.name, known.key
         self._light_field: LightField | None = None
@@ -283,9 +271,7 @@ class RemoteSynthesizer:
     def _asked(self, at: tuple[float, float], cancelled: Callable[[], bool], weighed: bool) -> Synthesis:
         if self._light_field is None:
             raise InputError("No light field is set; call set_light_field first.")
-        return self._process.synthesize(
-            self._model, self._light_field, at, cancelled, weighed=weighed, shares=self._shares
-        )
+        return self._process.synthesize(self._model, self._light_field, at, cancelled, weighed=weighed)
 
 
 def _shared_memory(size: int) -> SharedMemory:

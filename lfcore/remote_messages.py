@@ -43,7 +43,6 @@ class Synthesize:
     model: str
     u: float
     v: float
-    threads: int
     weighed: bool = False
 
 

@@ -8,7 +8,6 @@ import os
 import signal
 import sys
 from collections.abc import Callable
-from functools import lru_cache
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
 
@@ -47,11 +46,10 @@ def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(niceness)
-    # Threads of the networks that wait for each other spin for some microseconds, then sleep: for ever spinning ones would
-    # keep the frame loop, and each other, from the cores; ones that sleep at once make the thousands of small steps of
-    # the plane sweep five times slower (2.1 s in place of 0.45 s). Read when torch is loaded.
+    # Threads of the networks that wait for each other spin for a microsecond or two, then sleep: longer spinning would keep the
+    # frame loop, and each other, from the cores (docs/speed.md). Read when torch is loaded.
     if "OMP_WAIT_POLICY" not in os.environ:
-        os.environ.setdefault("GOMP_SPINCOUNT", "10000")
+        os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     if make is shipped_models:
         import torch  # noqa: F401  # now, while the program opens its window and its file
     server = _Server(connection, make)
@@ -60,22 +58,6 @@ def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
             request: Request = connection.recv()
             if not isinstance(request, Cancel):  # one that came too late
                 connection.send(server.reply(request))
-
-
-def _use_threads(count: int) -> None:
-    """Let the networks use so many threads, or fewer where the person has said so (OMP_NUM_THREADS)."""
-    torch = sys.modules.get("torch")  # models without it have no threads
-    if torch is not None:
-        wanted = min(count, _most_threads())
-        if torch.get_num_threads() != wanted:
-            torch.set_num_threads(wanted)
-
-
-@lru_cache(maxsize=1)
-def _most_threads() -> int:
-    import torch
-
-    return torch.get_num_threads()  # asked before any other number is set
 
 
 class _Server:
@@ -127,7 +109,6 @@ class _Server:
         if request.model not in self._prepared:
             synthesizer.set_light_field(self._light_field)
             self._prepared.add(request.model)
-        _use_threads(request.threads)
         ask = synthesizer.synthesize
         if request.weighed and isinstance(synthesizer, WeighingSynthesizer):
             ask = synthesizer.synthesize_weighed

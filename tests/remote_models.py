@@ -48,10 +48,6 @@ class Blender:
         if self.name == "dying":
             os._exit(3)
         image = blend(self._corners, u, v)
-        if self.name == "threads":
-            import torch
-
-            image = np.full_like(image, torch.get_num_threads())
         disparity = None if self.name == "flat" else np.full(image.shape[:2], u - v, np.float32)
         return Synthesis(u, v, self.name, image, disparity, None, {"total": 0.5})
 
@@ -73,6 +69,4 @@ def make(model: str) -> Synthesizer:
         return Weigher(model)
     if model == "missing":
         raise InputError("There is no such model.")
-    if model == "threads":
-        import torch  # noqa: F401  # as models with networks do
     return Blender(model)

@@ -21,7 +21,6 @@ from remote_models import PATIENT_SECONDS, blend, make
 from lfcore import remote
 from lfcore.errors import Cancelled, InputError, LfviewError
 from lfcore.lightfield import LightField
-from lfcore.machine import core_count
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.synthesizer import MeanSynthesizer
 from lfcore.weights_header import Stated
@@ -280,23 +279,6 @@ def test_a_shipped_model_gives_the_same_there_and_here() -> None:
     with SynthesisProcess() as process:
         process.start()
         assert np.array_equal(asked(process, "mean", field).image, here.synthesize(0.5, 0.5).image)
-
-
-def test_a_core_is_left_to_the_program_by_queries_that_share(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)  # it would be the most in any case
-    cores = core_count()
-
-    def threads(synthesizer: RemoteSynthesizer) -> float:
-        synthesizer.set_light_field(light_field(4, 4))
-        return float(synthesizer.synthesize(0.5, 0.5).image[0, 0, 0])
-
-    with SynthesisProcess(make) as process:
-        alone, sharing = RemoteSynthesizer(process, "threads"), RemoteSynthesizer(process, "threads", shares=True)
-        most = threads(alone)
-        assert threads(sharing) == most
-        process.share_processor()
-        assert threads(sharing) == max(min(most, cores - 1), 1)
-        assert threads(alone) == most
 
 
 def test_a_program_that_asks_does_not_load_torch() -> None:
