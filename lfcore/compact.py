@@ -15,10 +15,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from lfcore.neighbourhoods import greatest_around, in_blocks, mean_around
 from lfcore.networks import INPUTS
 from lfcore.planesweep import Levels
 from lfcore.tone import stored_from_root
 
+AGREEMENT_REACH = 2  # pixels of half resolution around each over which the sweep's deviation is looked at
 ALIGNMENT = 4  # height and width must be whole numbers of so many pixels: half resolution, and a stride of 2 from there
 
 
@@ -105,7 +107,7 @@ class CompactDisparity(nn.Module):
         with torch.autocast(features.device.type, enabled=False):  # in bfloat16 the mean over levels would be rounded
             h = h.float()
             # The start is the paper's classical forebear: the level at which the inputs agree best in a small window.
-            agreement = F.avg_pool2d(features[:, count:].float(), 5, 1, 2, count_include_pad=False)
+            agreement = mean_around(features[:, count:].float(), AGREEMENT_REACH)
             logits = self.score(h) - self.sharpness * agreement
             coarse_disparity = (logits.softmax(1) * self.values.view(1, -1, 1, 1)).sum(1, keepdim=True)
             return spread_out(coarse_disparity, self.spread(h)), h
@@ -146,10 +148,12 @@ class CompactColour(nn.Module):
         inputs = warped.view(b, INPUTS, 3, h, w)
         mean = inputs.mean(1)  # (B, 3, h, w)
         differences = (inputs - mean.unsqueeze(1)).view(b, 3 * INPUTS, h, w)
-        colours = F.pixel_unshuffle(torch.cat((4 * mean - 2, 10 * differences), 1), 2)  # (B, 60, h/2, w/2)
+        colours = in_blocks(torch.cat((4 * mean - 2, 10 * differences), 1))  # (B, 60, h/2, w/2)
         flat = positions.view(b, 2, 1, 1).expand(b, 2, h // 2, w // 2) * 2 - 1
-        slope = F.avg_pool2d(disparity, 2) / 5
-        range_ = F.max_pool2d(disparity, 6, 2, 2) + F.max_pool2d(-disparity, 6, 2, 2)  # how near an edge of depth is
+        own = in_blocks(disparity)
+        slope = own.mean(1, keepdim=True) / 5
+        greatest, least = own.amax(1, keepdim=True), own.amin(1, keepdim=True)
+        range_ = greatest_around(greatest, 1) + greatest_around(-least, 1)  # how near an edge of depth is
         x = torch.cat((colours, flat, slope, range_ / 5), 1)
         hidden = F.relu(self.blocks(self.stem(x)))
         logits, residual = self.weights(hidden), self.residual(hidden) + self.straight(x)

@@ -15,6 +15,8 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from lfcore import kernels
+from lfcore.compact import AGREEMENT_REACH
+from lfcore.neighbourhoods import greatest_around, mean_around
 from lfcore.networks import INPUTS
 from lfcore.tone import TOE, stored_from_root
 from lfcore.warp import QUICK_A, quick_sample
@@ -141,7 +143,7 @@ class TorchParts:
         _, _, h, w = pixels.shape
         heads, levels = self._heads, len(self._heads.values)
         rows = pixels.permute(0, 2, 3, 1).reshape(h * w, -1).float()  # (h w, C)
-        agreement = _box(features[:, levels:].to(torch.float32, memory_format=torch.channels_last))
+        agreement = mean_around(features[:, levels:].to(torch.float32, memory_format=torch.channels_last), AGREEMENT_REACH)
         scores = torch.addmm(heads.score[1], rows, heads.score[0].T)  # (h w, L)
         scores.sub_(agreement.permute(0, 2, 3, 1).reshape(h * w, -1), alpha=heads.sharpness)
         coarse = (scores.softmax(1) @ heads.values).view(1, 1, h, w)
@@ -163,7 +165,7 @@ class TorchParts:
         colours[:, 1:] = (warped - mean).permute(2, 0, 1, 3, 4)
         channels[0, 60:62] = torch.tensor(position).view(2, 1, 1)
         channels[0, 62] = disparity.mean(0)
-        channels[0, 63] = _widest(disparity.amax(0)) + _widest(-disparity.amin(0))
+        channels[0, 63] = greatest_around(disparity.amax(0), 1) + greatest_around(-disparity.amin(0), 1)
         return Gathered(channels.contiguous(memory_format=torch.channels_last), warped)
 
     def blended(
@@ -203,31 +205,6 @@ def _warped_phases(corners: Tensor, disparity: Tensor, offsets: Tensor, reach: i
     x = torch.addcmul(columns, du, disparity).view(INPUTS, PHASES * h, w)
     y = torch.addcmul(rows, dv, disparity).view(INPUTS, PHASES * h, w)
     return quick_sample(corners, x, y).view(INPUTS, 3, PHASES, h, w)
-
-
-def _box(values: Tensor) -> Tensor:
-    """Mean over 5 x 5, at the edges over what there is. A convolution is four times as fast as torch's pooling here."""
-    channels, height, width = values.shape[1:]
-    sums = F.conv2d(values, torch.ones(channels, 1, 5, 5), padding=2, groups=channels)
-    return sums.div_(_neighbours(height).unsqueeze(1) * _neighbours(width))
-
-
-def _neighbours(size: int) -> Tensor:
-    """How many of five places around each lie within the size."""
-    places = torch.arange(size)
-    return ((places + 3).clamp(max=size) - (places - 2).clamp(min=0)).float()
-
-
-def _widest(values: Tensor) -> Tensor:
-    """The greatest of 3 x 3, at the edges of what there is: (h, w). Torch's pooling of one plane takes ten times as long."""
-    for dim in (0, 1):
-        size = values.shape[dim]
-        greatest = values.clone()
-        after, before = greatest.narrow(dim, 1, size - 1), greatest.narrow(dim, 0, size - 1)
-        torch.maximum(after, values.narrow(dim, 0, size - 1), out=after)
-        torch.maximum(before, values.narrow(dim, 1, size - 1), out=before)
-        values = greatest
-    return values
 
 
 def parts_of(heads: Heads) -> Parts:

@@ -18,13 +18,14 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfcore.compact import CompactDisparity, ResidualBlock, initialise_layers, log_nearness, start_as_sweep
+from lfcore.neighbourhoods import greatest_around, in_blocks
 from lfcore.networks import INPUTS
 from lfcore.planesweep import Levels, mean_and_deviation
 from lfcore.tone import stored_from_root
 
 SURFACES = 2  # disparities a pixel
 OFF_PLANE = (-1.5, -0.5, 0.5, 1.5)  # px beside the first disparity at which the inputs' agreement is looked at as well
-_NEIGHBOURHOODS = (3, 7)  # pixels of half resolution each way, within which another surface is looked for
+_NEIGHBOURHOODS = (1, 3)  # pixels of half resolution each way, within which another surface is looked for
 _CANDIDATES = 1 + len(_NEIGHBOURHOODS)
 
 
@@ -129,14 +130,14 @@ class Surfaces(nn.Module):
     def forward(
         self, warped: Tensor, off_plane: Tensor, disparity: Tensor, seen: Tensor, positions: Tensor
     ) -> tuple[Tensor, Tensor]:
-        own = F.pixel_unshuffle(disparity, 2)  # (B, 4, h/2, w/2)
+        own = in_blocks(disparity)  # (B, 4, h/2, w/2)
         middle = own.mean(1, keepdim=True)
         high, low = own.amax(1, keepdim=True), -own.amin(1, keepdim=True)
-        ranges = [(_widest(high, size), -_widest(low, size)) for size in _NEIGHBOURHOODS]
+        ranges = [(greatest_around(high, reach), -greatest_around(low, reach)) for reach in _NEIGHBOURHOODS]
         apart = [part for most, least in ranges for part in (most - middle, middle - least)]
         x = torch.cat(
             (
-                F.pixel_unshuffle(torch.cat((_contrasts(warped), 10 * off_plane), 1), 2),
+                in_blocks(torch.cat((_contrasts(warped), 10 * off_plane), 1)),
                 _flat(positions, own),
                 own - middle,
                 middle / 5,
@@ -180,10 +181,10 @@ class FineColour(nn.Module):
 
     def forward(self, warped: Tensor, disparities: Tensor, seen: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
         b, _, h, w = warped.shape
-        first, second = F.pixel_unshuffle(disparities[:, :1], 2), F.pixel_unshuffle(disparities[:, 1:], 2)
+        first, second = in_blocks(disparities[:, :1]), in_blocks(disparities[:, 1:])
         x = torch.cat(
             (
-                F.pixel_unshuffle(_contrasts(warped), 2),
+                in_blocks(_contrasts(warped)),
                 _flat(positions, first),
                 first.mean(1, keepdim=True) / 5,
                 (second - first) / 5,
@@ -213,10 +214,6 @@ def _contrasts(warped: Tensor) -> Tensor:
 def _flat(positions: Tensor, like: Tensor) -> Tensor:
     """(B, 2) of 0 .. 1 as planes of -1 .. 1 in the size of `like`."""
     return (2 * positions - 1)[:, :, None, None].expand(-1, 2, *like.shape[2:])
-
-
-def _widest(values: Tensor, size: int) -> Tensor:
-    return F.max_pool2d(values, size, 1, size // 2)
 
 
 def initialise_fine(model: FineModel, seed: int) -> None:
