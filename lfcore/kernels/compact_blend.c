@@ -1,0 +1,78 @@
+/* The last steps of the colour network of the small pair: weights of the inputs and a residual to the picture. */
+#include "compact.h"
+
+typedef struct {
+    const void *logits; /* (height, width, INPUTS, PHASES) */
+    const void *residual, *straight; /* (height, width, PHASES, 3) */
+    int halved;
+    const float *warped; /* (height, width, PHASES, INPUTS, 4) */
+    const float *nearness; /* (INPUTS): added to the logits */
+    Py_ssize_t height, width;
+    float middle, weight, toe; /* what was taken off the warped inputs, what the residual counts, of the root tone */
+    float *picture; /* (picture_height, picture_width, 3), stored values */
+    Py_ssize_t picture_height, picture_width; /* at most twice the pixels */
+} Blend;
+
+/* The inverse of the root tone, within 0 and 1; not a number becomes 0. */
+PART float stored(float toned, float toe) {
+    const float value = toned * toned - toe, positive = value > 0.0f ? value : 0.0f;
+    return positive < 1.0f ? positive : 1.0f;
+}
+
+PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const Sixteen nearness) {
+    const Py_ssize_t pixel = y * b->width + x;
+    float scores[INPUTS * PHASES], residual[3 * PHASES + 1], straight[3 * PHASES + 1]; /* three channels are read as four */
+    as_floats(b->logits, pixel * INPUTS * PHASES, INPUTS * PHASES, b->halved, scores);
+    as_floats(b->residual, pixel * 3 * PHASES, 3 * PHASES, b->halved, residual);
+    as_floats(b->straight, pixel * 3 * PHASES, 3 * PHASES, b->halved, straight);
+    residual[3 * PHASES] = straight[3 * PHASES] = 0.0f;
+    const Sixteen sums = sixteen_at(scores) + nearness;
+    const Sixteen shares = exponential(sums - four_times(quarters_greatest(sums)));
+    const Four whole = sum_of_quarters(shares);
+    for (int phase = 0; phase < PHASES; ++phase) {
+        const Py_ssize_t row = 2 * y + phase / 2, column = 2 * x + phase % 2;
+        if (row >= b->picture_height || column >= b->picture_width) continue;
+        const float *warped = b->warped + (pixel * PHASES + phase) * INPUTS * 4;
+        Four sum = {0.0f};
+        for (int n = 0; n < INPUTS; ++n) sum += shares[PHASES * n + phase] * four_at(warped + 4 * n);
+        const Four added = four_at(residual + 3 * phase) + four_at(straight + 3 * phase);
+        const Four toned = sum / whole[phase] + b->middle + b->weight * added;
+        float *out = b->picture + (row * b->picture_width + column) * 3;
+        for (int c = 0; c < 3; ++c) out[c] = stored(toned[c], b->toe);
+    }
+}
+
+MANY_PROCESSORS
+static void blend_rows(const Blend *b, Py_ssize_t begin, Py_ssize_t end) {
+    float scores[INPUTS * PHASES];
+    for (int i = 0; i < INPUTS * PHASES; ++i) scores[i] = b->nearness[i / PHASES];
+    const Sixteen nearness = sixteen_at(scores);
+    for (Py_ssize_t y = begin; y < end; ++y)
+        for (Py_ssize_t x = 0; x < b->width; ++x) blend_pixel(b, y, x, nearness);
+}
+
+static void whole_blend(const Blend *b, int threads) {
+    const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, b->height);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
+    for (Py_ssize_t part = 0; part < parts; ++part)
+        blend_rows(b, b->height * part / parts, b->height * (part + 1) / parts);
+}
+
+PyObject *compact_blend(PyObject *Py_UNUSED(module), PyObject *arguments) {
+    Blend b;
+    unsigned long long logits, residual, straight, warped, nearness, picture;
+    int threads;
+    if (!PyArg_ParseTuple(arguments, "KKKKKKnnnnfffpi", &logits, &residual, &straight, &warped, &nearness, &picture, &b.height,
+                          &b.width, &b.picture_height, &b.picture_width, &b.middle, &b.weight, &b.toe, &b.halved, &threads))
+        return NULL;
+    b.logits = at_address(logits);
+    b.residual = at_address(residual);
+    b.straight = at_address(straight);
+    b.warped = at_address(warped);
+    b.nearness = at_address(nearness);
+    b.picture = at_address(picture);
+    Py_BEGIN_ALLOW_THREADS
+    whole_blend(&b, threads);
+    Py_END_ALLOW_THREADS
+    Py_RETURN_NONE;
+}

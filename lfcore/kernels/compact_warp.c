@@ -1,0 +1,134 @@
+/* The inputs of the small pair warped by its disparity, as its colour network takes them. */
+#include "compact.h"
+
+#define GATHERED 64 /* channels that the colour network takes */
+
+PART void from_floats(const float *restrict values, Py_ssize_t count, int halved, void *out, Py_ssize_t first) {
+    if (halved) {
+        uint16_t *restrict result = (uint16_t *)out + first;
+        for (Py_ssize_t i = 0; i < count; ++i) result[i] = (uint16_t)rounded(bits_of(values[i]));
+    } else
+        memcpy((float *)out + first, values, count * sizeof(float));
+}
+
+typedef struct {
+    const float *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
+    Py_ssize_t source_height, source_width;
+    const float *disparity; /* (PHASES, height, width), px */
+    const float *offsets; /* (INPUTS, 2): what a pixel of disparity moves the place of sampling by, along x and y */
+    Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
+    float a; /* of the cubic kernel */
+    float u, v; /* as the colour network takes them */
+    void *gathered; /* (height, width, GATHERED) */
+    int halved;
+    float *warped; /* (height, width, PHASES, INPUTS, 4) */
+} Warp;
+
+/* Places nearer than a pixel to the edge, or not numbers, are moved there: the corners are continued by more than that. */
+PART float inner_place(float place, Py_ssize_t size) {
+    const float bounded = place > 1.0f ? place : 1.0f, last = (float)(size - 3);
+    return bounded < last ? bounded : last;
+}
+
+PART Four sample_colours(const float *corner, Py_ssize_t height, Py_ssize_t width, float x, float y, float a) {
+    const float near_x = inner_place(x, width), near_y = inner_place(y, height);
+    const Py_ssize_t whole_x = (int32_t)near_x, whole_y = (int32_t)near_y;
+    const Four across = cubic_taps(near_x - (float)whole_x, a), down = cubic_taps(near_y - (float)whole_y, a);
+    const float *place = corner + 4 * ((whole_y - 1) * width + whole_x - 1);
+    const Sixteen sum = down[0] * sixteen_at(place) + down[1] * sixteen_at(place + 4 * width) +
+                        down[2] * sixteen_at(place + 8 * width) + down[3] * sixteen_at(place + 12 * width);
+    Four columns[4];
+    memcpy(columns, &sum, sizeof columns);
+    return across[0] * columns[0] + across[1] * columns[1] + across[2] * columns[2] + across[3] * columns[3];
+}
+
+/* The least or greatest (with its sign turned) disparity of the three rows around y, by column. */
+PART void widest_of_rows(const Warp *warp, Py_ssize_t y, float sign, float *restrict widest) {
+    const Py_ssize_t w = warp->width;
+    for (Py_ssize_t x = 0; x < w; ++x) widest[x] = -INFINITY;
+    for (Py_ssize_t near = at_least(y - 1, 0); near <= at_most(y + 1, warp->height - 1); ++near)
+        for (int phase = 0; phase < PHASES; ++phase) {
+            const float *restrict row = warp->disparity + (phase * warp->height + near) * w;
+            for (Py_ssize_t x = 0; x < w; ++x) widest[x] = sign * row[x] > widest[x] ? sign * row[x] : widest[x];
+        }
+}
+
+PART float widest_around(const float *widest, Py_ssize_t x, Py_ssize_t width) {
+    const float left = widest[within(x - 1, width)], right = widest[within(x + 1, width)];
+    const float sides = left > right ? left : right;
+    return sides > widest[x] ? sides : widest[x];
+}
+
+PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict greatest, float *restrict least) {
+    const Py_ssize_t w = warp->width, source = 4 * warp->source_height * warp->source_width;
+    widest_of_rows(warp, y, 1.0f, greatest);
+    widest_of_rows(warp, y, -1.0f, least);
+    for (Py_ssize_t x = 0; x < w; ++x) {
+        float *restrict warped = warp->warped + (y * w + x) * PHASES * INPUTS * 4;
+        float gathered[GATHERED]; /* three channels are written as four; what comes after overwrites the fourth */
+        float total = 0.0f;
+        for (int phase = 0; phase < PHASES; ++phase) {
+            const float disparity = warp->disparity[(phase * warp->height + y) * w + x];
+            const float column = (float)(2 * x + phase % 2 + warp->reach), row = (float)(2 * y + phase / 2 + warp->reach);
+            Four samples[INPUTS], mean = {0.0f};
+            total += disparity;
+            for (int n = 0; n < INPUTS; ++n) {
+                samples[n] = sample_colours(warp->corners + n * source, warp->source_height, warp->source_width,
+                                            column + warp->offsets[2 * n] * disparity,
+                                            row + warp->offsets[2 * n + 1] * disparity, warp->a);
+                mean += samples[n];
+            }
+            memcpy(warped + phase * INPUTS * 4, samples, sizeof samples);
+            mean *= 0.25f;
+            memcpy(gathered + 15 * phase, &mean, sizeof mean);
+            for (int n = 0; n < INPUTS; ++n) {
+                const Four difference = samples[n] - mean;
+                memcpy(gathered + 15 * phase + 3 * (n + 1), &difference, sizeof difference);
+            }
+        }
+        gathered[60] = warp->u;
+        gathered[61] = warp->v;
+        gathered[62] = 0.25f * total;
+        gathered[63] = widest_around(greatest, x, w) + widest_around(least, x, w);
+        from_floats(gathered, GATHERED, warp->halved, warp->gathered, (y * w + x) * GATHERED);
+    }
+}
+
+MANY_PROCESSORS
+static int warp_rows(const Warp *warp, Py_ssize_t begin, Py_ssize_t end) {
+    float *widest = malloc(2 * warp->width * sizeof(float));
+    if (widest == NULL) return -1;
+    for (Py_ssize_t y = begin; y < end; ++y) warp_row(warp, y, widest, widest + warp->width);
+    free(widest);
+    return 0;
+}
+
+static int whole_warp(const Warp *warp, int threads) {
+    const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, warp->height);
+    int failed = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(| : failed)
+    for (Py_ssize_t part = 0; part < parts; ++part)
+        failed |= warp_rows(warp, warp->height * part / parts, warp->height * (part + 1) / parts);
+    return failed;
+}
+
+PyObject *compact_warp(PyObject *Py_UNUSED(module), PyObject *arguments) {
+    Warp warp;
+    unsigned long long corners, disparity, offsets, gathered, warped;
+    int threads;
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnfffpi", &corners, &disparity, &offsets, &gathered, &warped, &warp.source_height,
+                          &warp.source_width, &warp.height, &warp.width, &warp.reach, &warp.a, &warp.u, &warp.v, &warp.halved,
+                          &threads))
+        return NULL;
+    warp.corners = at_address(corners);
+    warp.disparity = at_address(disparity);
+    warp.offsets = at_address(offsets);
+    warp.gathered = at_address(gathered);
+    warp.warped = at_address(warped);
+    int failed;
+    Py_BEGIN_ALLOW_THREADS
+    failed = whole_warp(&warp, threads);
+    Py_END_ALLOW_THREADS
+    if (failed) return PyErr_NoMemory();
+    Py_RETURN_NONE;
+}
