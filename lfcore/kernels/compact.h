@@ -49,7 +49,7 @@ PART Sixteen four_times(Four four) {
     return sixteen;
 }
 
-/* e to the x for x <= 0, to a part in 5 million; below -87 and not a number as at -87. */
+/* e to the x for x <= 0, to a part in 4 million; below -87 and not a number as at -87. */
 PART Sixteen exponential(Sixteen x) {
     const Sixteen zero = {0.0f}, bounded = greater_of_sixteen(x, zero - 87.0f);
     const SixteenWhole power = __builtin_convertvector(bounded * 1.44269504f - 0.5f, SixteenWhole);
