@@ -13,12 +13,16 @@ import torch
 from torch import Tensor
 
 
+_FUNCTIONS = ("plane_sweep", "cubic_sample", "compact_disparity", "compact_warp", "compact_blend")
+
+
 def _compiled() -> ModuleType | None:
+    """The module, but not one that has been compiled from older source and lies in a checkout still."""
     try:
         from lfcore import _kernels  # type: ignore[attr-defined]
     except ImportError:
         return None
-    return _kernels
+    return _kernels if all(hasattr(_kernels, name) for name in _FUNCTIONS) else None
 
 
 _KERNELS = _compiled()
