@@ -12,7 +12,6 @@ from types import ModuleType
 import torch
 from torch import Tensor
 
-
 _FUNCTIONS = ("plane_sweep", "cubic_sample", "compact_disparity", "compact_warp", "compact_blend")
 
 
