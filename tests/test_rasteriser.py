@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from pathlib import Path
 
 import moderngl
@@ -36,3 +37,22 @@ def test_threads_of_the_rasteriser_share_no_core_while_there_are_enough(gl: mode
     finally:
         for thread, allowed in before.items():
             os.sched_setaffinity(thread, allowed)
+
+
+def test_threads_that_end_meanwhile_do_no_harm() -> None:
+    over = threading.Event()
+
+    def come_and_go() -> None:
+        while not over.is_set():
+            threading.Thread(target=lambda: None).start()
+
+    busy = [threading.Thread(target=come_and_go) for _ in range(2)]
+    for thread in busy:
+        thread.start()
+    try:
+        for _ in range(300):
+            spread_rasteriser()
+    finally:
+        over.set()
+        for thread in busy:
+            thread.join()

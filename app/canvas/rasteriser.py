@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 from pathlib import Path
@@ -20,7 +21,8 @@ def spread_rasteriser() -> int:
     cores = sorted(os.sched_getaffinity(0))
     threads = _threads()
     for thread, number in threads.items():
-        os.sched_setaffinity(thread, {cores[number % len(cores)]})
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            os.sched_setaffinity(thread, {cores[number % len(cores)]})
     return len(threads)
 
 
@@ -28,7 +30,10 @@ def _threads() -> dict[int, int]:
     """The rasteriser's number of each of its threads, by the system's number of the thread."""
     found = {}
     for task in Path("/proc/self/task").iterdir():
-        name = (task / "comm").read_text().strip()
+        try:
+            name = (task / "comm").read_text().strip()
+        except OSError:  # a thread of the program that has just ended
+            continue
         number = name.removeprefix(_NAME)
         if name.startswith(_NAME) and number.isdecimal():
             found[int(task.name)] = int(number)
