@@ -127,9 +127,7 @@ class _Scene:
         found = best.disparity()
         guide = self._guide(found)
         trust = best.confidence().pow(tuning.trust)[None, None] + 1e-3
-        smooth = _guided(
-            torch.cat((trust * found, trust)), guide, tuning.smooth_radius, tuning.epsilon
-        )  # (2, 1, h, w)
+        smooth = _guided(torch.cat((trust * found, trust)), guide, tuning.smooth_radius, tuning.epsilon)  # (2, 1, h, w)
         clock.lap("disparity")
         return (smooth[0, 0] / smooth[1, 0].clamp(min=1e-3)).clamp(self._levels.low, self._levels.high)
 

@@ -125,9 +125,7 @@ def _layer(
 
 
 def _block_layers(blocks: nn.Sequential, dtype: torch.dtype) -> list[tuple[Layer, Layer]]:
-    return [
-        (_layer(block.first, dtype), _layer(block.second, dtype)) for block in blocks if isinstance(block, ResidualBlock)
-    ]
+    return [(_layer(block.first, dtype), _layer(block.second, dtype)) for block in blocks if isinstance(block, ResidualBlock)]
 
 
 def _matrix(convolution: nn.Conv2d) -> tuple[Tensor, Tensor]:

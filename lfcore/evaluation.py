@@ -228,8 +228,7 @@ def score_table(evaluations: Sequence[Evaluation]) -> str:
         )
         lines.append(f"{name:<{first}}  {cells}")
     means = "  ".join(
-        f"{e.mean_psnr:>{width - 18}.2f} {e.mean_ssim:>7.4f} {'':>9}"
-        for e, width in zip(evaluations, widths, strict=True)
+        f"{e.mean_psnr:>{width - 18}.2f} {e.mean_ssim:>7.4f} {'':>9}" for e, width in zip(evaluations, widths, strict=True)
     )
     return "\n".join([*lines, f"{'mean':<{first}}  {means}".rstrip()])
 

@@ -70,9 +70,7 @@ _BLOCK_VALUES = 2**19
 _BLOCK_LEVELS = 16
 
 
-def plane_sweep(
-    luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor | None = None
-) -> Tensor:
+def plane_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor | None = None) -> Tensor:
     """Features of the disparity network at one viewpoint, over a window of the picture.
 
     luma: (N, B, H, W) float32, luminance of the N inputs of B light fields that share the viewpoint. offsets: (N, 2), p_i - q

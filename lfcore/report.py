@@ -90,15 +90,12 @@ def _scores(report: Report) -> str:
         for evaluation in report.evaluations
     ]
     best = " The best of each row is bold." if len(models) > 1 else ""
-    return (
-        "<h2>Scores</h2>\n"
-        + _scrolling(
-            f"<table><caption>PSNR, SSIM and seconds for one view, by scene and model.{best}</caption>"
-            f'<thead><tr><th></th>{heads}</tr><tr><th scope="col">scene</th>{columns}</tr></thead>'
-            f"<tbody>{''.join(rows)}</tbody>"
-            f'<tfoot><tr><th scope="row">mean of {len(rows)}</th>{_score_cells(means)}</tr></tfoot></table>',
-            "scores",
-        )
+    return "<h2>Scores</h2>\n" + _scrolling(
+        f"<table><caption>PSNR, SSIM and seconds for one view, by scene and model.{best}</caption>"
+        f'<thead><tr><th></th>{heads}</tr><tr><th scope="col">scene</th>{columns}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody>"
+        f'<tfoot><tr><th scope="row">mean of {len(rows)}</th>{_score_cells(means)}</tr></tfoot></table>',
+        "scores",
     )
 
 

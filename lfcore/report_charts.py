@@ -45,9 +45,7 @@ def curve_chart(curve: Sequence[CurvePoint], name: str) -> str:
         line = " ".join(f"{x(step):.1f},{y(value):.1f}" for step, value in points)
         colour = f"var(--c{index % _COLOURS})"
         dash = _DASHES[index % len(_DASHES)]
-        parts.append(
-            f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
-        )
+        parts.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>')
         if len(points) <= _MOST_DOTS:
             parts += [f'<circle cx="{x(step):.1f}" cy="{y(value):.1f}" r="3" fill="{colour}"/>' for step, value in points]
         place = y(points[-1][1]) + 4

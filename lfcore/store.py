@@ -161,8 +161,6 @@ def _files(folder: Path) -> Iterator[KeptFile]:
     return (entry for entry in entries(folder) if entry.path.suffix == _SUFFIX and entry.path.name[0] != ".")
 
 
-
-
 def _largest(size: tuple[int, int]) -> int:
     return len(_MAGIC) + 4 + _HEADER_LIMIT + 8 * size[0] * size[1] + _DIGEST_BYTES
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
+from lfcore.fourier import LEAST_CHANNELS, FourierConvolution
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Window
 
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
+Layer = Callable[[Tensor], Tensor]
 _STEP = 16  # widths that are multiples of it suit the blocks in which convolutions are computed
 
 
@@ -25,6 +28,12 @@ class Tuning:
     tile_width: int = 272  # px that come out; the height follows from tile_pixels
     channel_multiple: int = 1  # channels of hidden layers are filled up with zeros to a multiple of this
     tile_pixels: int = TILE_PIXELS
+    fourier: bool = False  # whether convolutions are computed by Fourier transforms (lfcore.fourier), channels as they are
+
+    @classmethod
+    def by_fourier(cls, dtype: torch.dtype) -> Tuning:
+        """With Fourier transforms: in tiles that are larger, since the transforms' own have overlaps already."""
+        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, True)
 
     def tiles(self, height: int, width: int) -> Iterator[Tile]:
         """Cover a picture with tiles of about equal size, from the top left."""
@@ -90,20 +99,19 @@ class TunedStack:
     def __init__(self, stack: PaperStack, tuning: Tuning) -> None:
         self.dtype = tuning.dtype
         convolutions = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
-        layers: list[nn.Module] = []
-        for layer in convolutions:
-            layers += [_filled(layer, tuning.channel_multiple), nn.ReLU(inplace=True)]
         self._channels = convolutions[0].in_channels
-        self._hidden = nn.Sequential(*layers).to(dtype=tuning.dtype, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        least = LEAST_CHANNELS if tuning.fourier else 1
+        filled = [_filled(layer, tuning.channel_multiple, least) for layer in convolutions]
+        self._input_channels = filled[0].in_channels
+        compute = _by_fourier if tuning.fourier else _directly
+        self._hidden = [compute(layer, tuning.dtype) for layer in filled]
         self._last = stack.last
         self._outputs = convolutions[-1].out_channels
 
     def empty_input(self, height: int, width: int) -> Tensor:
         """Where an input is written: (1, C, height, width) in the layout and type that the first layer wants. The stack's own
         channels come first and are not set; filled ones are 0."""
-        first = self._hidden[0]
-        assert isinstance(first, nn.Conv2d)
-        x = torch.empty(1, first.in_channels, height, width, dtype=self.dtype, memory_format=torch.channels_last)
+        x = torch.empty(1, self._input_channels, height, width, dtype=self.dtype, memory_format=torch.channels_last)
         x[:, self._channels :] = 0
         return x
 
@@ -117,13 +125,24 @@ class TunedStack:
 
     def __call__(self, x: Tensor) -> Tensor:
         """An input as `empty_input` makes it to (1, outputs, height - 12, width - 12) float32."""
-        hidden = self._hidden(x)[:, : self._outputs]
-        result: Tensor = self._last(hidden.float())
+        for layer in self._hidden:
+            x = layer(x)
+        result: Tensor = self._last(x[:, : self._outputs].float())
         return result
 
 
-def _filled(layer: nn.Conv2d, multiple: int) -> nn.Conv2d:
-    inputs, outputs = (-(-channels // multiple) * multiple for channels in (layer.in_channels, layer.out_channels))
+def _directly(layer: nn.Conv2d, dtype: torch.dtype) -> Layer:
+    assert layer.bias is not None
+    weight, bias = layer.weight.to(dtype=dtype, memory_format=torch.channels_last), layer.bias.to(dtype)
+    return lambda x: F.conv2d(x, weight, bias).relu_()
+
+
+def _by_fourier(layer: nn.Conv2d, dtype: torch.dtype) -> Layer:
+    return FourierConvolution(layer, dtype)
+
+
+def _filled(layer: nn.Conv2d, multiple: int, least: int) -> nn.Conv2d:
+    inputs, outputs = (max(-(-count // multiple) * multiple, least) for count in (layer.in_channels, layer.out_channels))
     kernel = layer.kernel_size
     filled = nn.utils.skip_init(nn.Conv2d, inputs, outputs, (kernel[0], kernel[1]))
     assert filled.bias is not None and layer.bias is not None

@@ -1,8 +1,9 @@
-"""How convolutions are laid out on this machine: number type, width of tiles, filled channels. Measured once, remembered.
+"""How convolutions are computed on this machine: number type, directly or by Fourier transforms, width of tiles, filled
+channels. Measured once, remembered.
 
 What is fastest differs widely: bfloat16 gains four-fold with AMX and loses without AVX-512; channel counts that are multiples
-of 32 gain three-fold with AMX and lose a quarter without. So the layers that cost most are timed the first time, within
-two seconds or so, and the choice is kept in a file beside the kept views.
+of 32 gain three-fold with AMX and lose a quarter without; Fourier transforms gain three-fold without AMX. So the layers
+that cost most are timed the first time, within two seconds or so, and the choice is kept in a file beside the kept views.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ import torch
 
 from lfcore.atomic import atomic_path
 from lfcore.errors import OutputError
+from lfcore.kernels import compiled
 from lfcore.networks import BORDER, PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
 _SURE_ROUNDS = 4
 _SMALL_WIDTH = 144
+_FOURIER_ROWS = 32  # with which, at _SMALL_WIDTH, few pixels of the transforms' own tiles are lost
 _ROUNDS = 10  # in turn, and the best of each, so that a busy moment of the machine does not decide
 _WIDTHS = (272, 144, 208, 384, 544)  # what is usual first
 _CHANNELS = (1, 16, 32)
@@ -56,23 +59,29 @@ def retune() -> Tuning:
     return tuning
 
 
-def measured(widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS) -> tuple[Tuning, bool]:
-    """Type and filling first, at a small width, then the width; and whether there was time to time all choices well.
+def measured(
+    widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS, fourier: bool | None = None
+) -> tuple[Tuning, bool]:
+    """Type, way and filling first, at a small width, then the width; and whether there was time to time all choices well.
 
-    The plain choices come first and stay unless another gains clearly: timings are never free of noise, and bfloat16 has to be
-    worth its lost digits.
+    fourier: whether Fourier transforms are among the choices; None: where they are compiled. The plain choices come first and
+    stay unless another gains clearly: timings are never free of noise, and bfloat16 has to be worth its lost digits.
     """
     began = time.perf_counter()
+    by_fourier = compiled() if fourier is None else fourier
     exact_kinds = [Tuning(torch.float32, _SMALL_WIDTH, multiple) for multiple in channels]
+    if by_fourier:
+        exact_kinds.insert(1, replace(Tuning.by_fourier(torch.float32), tile_width=_SMALL_WIDTH))
     short_kinds = [replace(kind, dtype=torch.bfloat16) for kind in exact_kinds]
     # By turns, so that where time is short the plain ones of both types are compared.
     kinds = [kind for pair in zip(exact_kinds, short_kinds, strict=True) for kind in pair]
-    seconds, sure_kind = _fastest(kinds, 2, began + _BUDGET_SECONDS / 2)
-    kind = _clearly_least([_clearly_least(same, seconds, 0.9) for same in (exact_kinds, short_kinds)], seconds, 0.8)
+    cost, sure_kind = _fastest(kinds, 4 if by_fourier else 2, began + _BUDGET_SECONDS / 2)
+    kind = _clearly_least([_clearly_least(same, cost, 0.9) for same in (exact_kinds, short_kinds)], cost, 0.8)
+    if kind.fourier:
+        return Tuning.by_fourier(kind.dtype), sure_kind
     shapes = [replace(kind, tile_width=width) for width in widths]
-    timed, sure_shape = _fastest(shapes, 0, began + _BUDGET_SECONDS)
-    per_column = {shape: spent / shape.tile_width for shape, spent in timed.items()}
-    return _clearly_least(shapes, per_column, 0.93), sure_kind and sure_shape
+    cost, sure_shape = _fastest(shapes, 0, began + _BUDGET_SECONDS)
+    return _clearly_least(shapes, cost, 0.93), sure_kind and sure_shape
 
 
 def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: float) -> Tuning:
@@ -82,7 +91,7 @@ def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: 
 
 
 def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> tuple[dict[Tuning, float], bool]:
-    """Seconds of a strip of the disparity network's hidden layers, by choice, infinite where it had too few turns; and whether
+    """Seconds a pixel of the disparity network's hidden layers, by choice, infinite where it had too few turns; and whether
     none had. The first `needed` always have enough."""
     seconds = dict.fromkeys(choices, math.inf)
     probes: dict[Tuning, Callable[[], float]] = {}
@@ -103,15 +112,16 @@ def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> tuple[d
 
 
 def _probe(tuning: Tuning) -> Callable[[], float]:
+    """Times a strip of the disparity network: seconds a pixel."""
     with torch.random.fork_rng(devices=[]):  # its random weights must not shift anybody's sequence
         stack = TunedStack(PaperStack(200, 1), tuning)
-    rows = max(8, 2 * torch.get_num_threads())  # the threads share out rows
+    rows = _FOURIER_ROWS if tuning.fourier else max(8, 2 * torch.get_num_threads())  # the threads share out rows
     x = stack.empty_input(rows + 2 * BORDER, tuning.tile_width + 2 * BORDER).zero_()
 
     def timed() -> float:
         start = time.perf_counter()
         stack(x)
-        return time.perf_counter() - start
+        return (time.perf_counter() - start) / (rows * tuning.tile_width)
 
     return timed
 
@@ -127,11 +137,10 @@ def remembered() -> Tuning | None:
     """This machine's choice, or None where there is none, or a damaged file."""
     values = _file_content().get(_machine_key(), {})
     try:
-        return Tuning(
-            _DTYPES[str(values["dtype"])],
-            _within(values["tile_width"], 16, 4096),
-            _within(values["channel_multiple"], 1, 64),
-        )
+        dtype = _DTYPES[str(values["dtype"])]
+        if values["fourier"] is True:
+            return Tuning.by_fourier(dtype)
+        return Tuning(dtype, _within(values["tile_width"], 16, 4096), _within(values["channel_multiple"], 1, 64))
     except (KeyError, ValueError):
         return None
 
@@ -153,6 +162,7 @@ def _remember(tuning: Tuning) -> None:
         "dtype": str(tuning.dtype).removeprefix("torch."),
         "tile_width": tuning.tile_width,
         "channel_multiple": tuning.channel_multiple,
+        "fourier": tuning.fourier,
     }
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -174,12 +184,14 @@ def _file_content() -> Mapping[str, Mapping[str, object]]:
 
 
 def _machine_key() -> str:
-    """Digest of all that the choice depends on: processor, its instructions, what is allowed of them, threads, torch."""
+    """Digest of all that the choice depends on: processor, its instructions, what is allowed of them, threads, torch, and
+    whether there are compiled kernels."""
     facts = (
         sorted(torch.cpu.get_capabilities().items()),
         torch.backends.cpu.get_cpu_capability(),
         os.environ.get("ONEDNN_MAX_CPU_ISA", ""),
         torch.get_num_threads(),
         torch.__version__,
+        compiled(),
     )
     return hashlib.blake2b(repr(facts).encode(), digest_size=16).hexdigest()

@@ -37,9 +37,7 @@ def source_offset(input_position: Tensor, novel_position: Tensor) -> Tensor:
     return input_position - novel_position
 
 
-def backward_warp(
-    image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[int, int] = (0, 0)
-) -> Tensor:
+def backward_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[int, int] = (0, 0)) -> Tensor:
     """Sample `image` at s + (p_i - q) D(s), differentiable in the disparity (paper, Eq. 3).
 
     image: (N, C, H, W) float32. disparity: (N or 1, 1, h, w) float32, px over the full baseline; one map may serve all images.
@@ -126,6 +124,4 @@ def _grid(position: Tensor, size: int) -> Tensor:
 
 
 def _bilinear(image: Tensor, grid_x: Tensor, grid_y: Tensor) -> Tensor:
-    return F.grid_sample(
-        image, torch.stack((grid_x, grid_y), -1), mode="bilinear", padding_mode="border", align_corners=True
-    )
+    return F.grid_sample(image, torch.stack((grid_x, grid_y), -1), mode="bilinear", padding_mode="border", align_corners=True)

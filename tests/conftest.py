@@ -58,7 +58,16 @@ def either_route(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 
     if request.param == "torch":
         monkeypatch.setattr(kernels, "_KERNELS", None)
-    elif not kernels.compiled():
+    else:
+        request.getfixturevalue("compiled_kernels")
+
+
+@pytest.fixture
+def compiled_kernels() -> None:
+    """They are there; else the test is skipped, or fails where they should have been compiled."""
+    from lfcore import kernels
+
+    if not kernels.compiled():
         if os.environ.get("CI") and shutil.which("cc"):
             pytest.fail("the kernels have not been compiled, though this machine has a compiler")
         pytest.skip("this installation has no compiled kernels")

@@ -40,6 +40,7 @@ SECONDS = 1.0  # of processor time for one file
 ROOM = 64 * 2**20  # bytes beyond four times the file
 HANG = 60  # seconds after which a file counts as hung, whatever else the machine does
 
+
 @dataclass(frozen=True)
 class Outcome:
     """What became of one case."""

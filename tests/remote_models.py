@@ -18,8 +18,10 @@ PATIENT_SECONDS = 30.0
 
 def blend(corners: FloatArray, u: float, v: float) -> FloatArray:
     """Corner views (4, H, W, 3) by their nearness to (u, v): tells them apart by place."""
-    return sum((np.float32(abs(1 - cu - u) * abs(1 - cv - v)) * view for (cu, cv), view in zip(CORNERS, corners, strict=True)),
-               np.zeros_like(corners[0]))
+    return sum(
+        (np.float32(abs(1 - cu - u) * abs(1 - cv - v)) * view for (cu, cv), view in zip(CORNERS, corners, strict=True)),
+        np.zeros_like(corners[0]),
+    )
 
 
 class Blender:

@@ -12,9 +12,7 @@ from lfcore.lightfield import FloatArray, LightField
 def smooth_texture(x: FloatArray, y: FloatArray) -> FloatArray:
     """A picture without end (..., 3), 0 to 1, smooth enough for bicubic interpolation to be nearly exact."""
     waves = [(0.11, 0.07, 0.3), (-0.05, 0.13, 1.1), (0.17, -0.04, 2.0), (0.23, 0.19, 0.7)]
-    channels = [
-        sum(np.sin(2 * np.pi * (fx * x + fy * y) / 2.6 + phase * (k + 1)) for fx, fy, phase in waves) for k in range(3)
-    ]
+    channels = [sum(np.sin(2 * np.pi * (fx * x + fy * y) / 2.6 + phase * (k + 1)) for fx, fy, phase in waves) for k in range(3)]
     return (0.5 + 0.11 * np.stack(channels, -1)).astype(np.float32)
 
 

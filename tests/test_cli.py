@@ -448,9 +448,7 @@ def test_a_bug_says_so_and_exits_with_1(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_want_of_memory_is_no_bug(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_want_of_memory_is_no_bug(scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def too_large(*_: object, **__: object) -> LightField:
         torch.empty(2**60)
         raise AssertionError

@@ -104,9 +104,7 @@ def test_bad_options_are_named_before_the_work(
     assert output.out == "" and expected in output.err
 
 
-def test_ctrl_c_leaves_no_file_behind(
-    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_leaves_no_file_behind(scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 

@@ -61,9 +61,7 @@ def test_a_figure_holds_its_cells_captions_and_legends() -> None:
     assert (page[:30] != blank[:30]).any()  # captions are drawn
     found = [np.where((page == cell.picture[0, 0]).all(axis=2)) for cell in cells]
     for cell, (rows, columns) in zip(cells, found, strict=True):
-        assert any(
-            np.array_equal(page[y : y + 40, x : x + 160], cell.picture) for y, x in zip(rows, columns, strict=True)
-        )
+        assert any(np.array_equal(page[y : y + 40, x : x + 160], cell.picture) for y, x in zip(rows, columns, strict=True))
     strip = table[np.linspace(0, 255, 160).round().astype(int)]
     assert any(np.array_equal(row[-168:-8], strip) for row in page)
 

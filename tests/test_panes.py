@@ -28,9 +28,7 @@ def test_pictures_side_by_side_show_the_same_part_equally_large(zoom: Zoom) -> N
     one, other = left.placement(zoom, PICTURE), right.placement(zoom, PICTURE)
     assert one.scale == other.scale
     inside = (30.0, 40.0)
-    seen = [
-        each.to_picture((pane.clip.x + inside[0], pane.clip.y + inside[1])) for pane, each in ((left, one), (right, other))
-    ]
+    seen = [each.to_picture((pane.clip.x + inside[0], pane.clip.y + inside[1])) for pane, each in ((left, one), (right, other))]
     assert seen[0] == pytest.approx(seen[1], abs=1.01 / one.scale)  # origins are whole pixels
 
 

@@ -163,11 +163,14 @@ def test_of_two_by_two_views_those_in_between_are_drawn(bench: Any, made_at: tup
     shifts = np.linspace(-4, 4, 9)
     positions = np.array([(u, v) for v in np.linspace(0, 1, 9) for u in np.linspace(0, 1, 9)])
     weights = aperture_weights(positions, (0.5, 0.5), 1.0, 1 / 8).reshape(9, 9)
-    expected = sum(
-        weights[j, i] * smooth_texture(x + shifts[i] - disparity * 0.5, y + shifts[j] - disparity * 0.5)
-        for j in range(9)
-        for i in range(9)
-    ) / weights.sum()
+    expected = (
+        sum(
+            weights[j, i] * smooth_texture(x + shifts[i] - disparity * 0.5, y + shifts[j] - disparity * 0.5)
+            for j in range(9)
+            for i in range(9)
+        )
+        / weights.sum()
+    )
     blurred = made.finished(Wanted((0.5, 0.5), disparity + 8, 1.0, False))
     assert np.abs(blurred - expected)[INSIDE].max() < 0.02
 

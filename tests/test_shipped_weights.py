@@ -9,6 +9,7 @@ import torch
 
 from assets import sample_path, weights_path
 from lfcore.formats import open_light_field
+from lfcore.kernels import compiled
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16, k16_view, psnr
 from lfcore.network_synthesizer import NetworkSynthesizer
@@ -56,6 +57,9 @@ def test_bfloat16_costs_no_more_than_a_twentieth_of_a_decibel_and_both_beat_the_
     exact = score(NetworkSynthesizer(weights.model, "float32", Tuning()), field)
     short = score(NetworkSynthesizer(weights.model, "bfloat16", Tuning(torch.bfloat16)), field)
     assert abs(exact - short) <= 0.05
+    if compiled():
+        by_fourier = score(NetworkSynthesizer(weights.model, "by Fourier", Tuning.by_fourier(torch.bfloat16)), field)
+        assert abs(exact - by_fourier) <= 0.05
     assert min(exact, short) > score(MeanSynthesizer(), field) + 3
 
 

@@ -58,9 +58,7 @@ def test_without_disparity(store: ViewStore) -> None:
     assert got.disparity is None
 
 
-def test_other_viewpoints_light_fields_models_and_code_find_nothing(
-    store: ViewStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_viewpoints_light_fields_models_and_code_find_nothing(store: ViewStore, monkeypatch: pytest.MonkeyPatch) -> None:
     store.put(key(-0.25, 0.75), synthesis())
     assert store.positions("lf", "m") == [(-0.25, 0.75)]
     for other in (key(0.25, 0.75), key(-0.25, 0.75, content="x"), key(-0.25, 0.75, model="x")):

@@ -221,9 +221,7 @@ def test_the_margin_holds_every_sample_of_the_sweep() -> None:
     assert margin(LEVELS) % 2 == 0  # half-resolution models begin at whole pixels of theirs
 
 
-def train_small(
-    tmp_path: Path, steps: int, run: str, stop_at: int | None = None, model: str = "full"
-) -> list[Progress]:
+def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None, model: str = "full") -> list[Progress]:
     config = TrainConfig(model=model, steps=steps, decay_share=0, loss=LossConfig(matching_steps=3), patches=SMALL)
     reports: list[Progress] = []
     train(
@@ -342,9 +340,7 @@ def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_p
 
 @pytest.mark.parametrize("model", ["full", "realtime", "fine"])
 def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path, model: str) -> None:
-    config = TrainConfig(
-        model=model, learning_rate=3e-4, warm_up_steps=1, loss=LossConfig(matching_steps=0), patches=SMALL
-    )
+    config = TrainConfig(model=model, learning_rate=3e-4, warm_up_steps=1, loss=LossConfig(matching_steps=0), patches=SMALL)
     trainer = Trainer(config, torch.device("cpu"), tmp_path)
     groups = trainer.draw([scene(5.0)], 0)
     errors = [trainer.take_step(groups) for _ in range(30)]

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -35,3 +37,17 @@ def test_tiles_of_a_filled_stack_are_parts_of_the_stack_on_the_mirrored_picture(
             window = tile.window
             part = expected[:, :, window.top : window.bottom, window.left : window.right]
             torch.testing.assert_close(tuned(x), part, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.usefixtures("compiled_kernels")
+@pytest.mark.parametrize("channels", [5, 24])
+def test_the_same_by_fourier_transforms(channels: int) -> None:
+    torch.manual_seed(2)
+    stack, features = PaperStack(channels, 3), torch.randn(1, channels, 50, 61)
+    expected = stack(F.pad(features, (BORDER,) * 4, mode="reflect"))
+    tuning = dataclasses.replace(Tuning.by_fourier(torch.float32), tile_width=32, tile_pixels=32 * 20)
+    tuned = TunedStack(stack, tuning)
+    with torch.inference_mode():
+        for tile in tuning.tiles(50, 61):
+            part = expected[:, :, tile.window.top : tile.window.bottom, tile.window.left : tile.window.right]
+            torch.testing.assert_close(tuned(tuned.tile_input(features, tile)), part, atol=1e-5, rtol=1e-5)

@@ -38,6 +38,9 @@ def test_what_was_measured_is_remembered(measurements: list[Tuning], folder: Pat
     tuning.machine_tuning.cache_clear()  # as a new process begins
     assert tuning.machine_tuning() == CHOICE
     assert len(measurements) == 1
+    by_fourier = Tuning.by_fourier(torch.bfloat16)
+    tuning._remember(by_fourier)
+    assert tuning.remembered() == by_fourier
     assert [path.name for path in folder.iterdir()] == ["tuning.json"]  # nothing else is left behind
     tuning.retune()
     assert len(measurements) == 2
@@ -46,8 +49,10 @@ def test_what_was_measured_is_remembered(measurements: list[Tuning], folder: Pat
 @pytest.mark.parametrize(
     "content",
     [b"", b"{", b"[1]", b"\xff\xfe", b'{"KEY": 3}', b'{"KEY": {"dtype": "int8", "tile_width": 208, "channel_multiple": 32}}',
-     b'{"KEY": {"dtype": "float32", "tile_width": 0, "channel_multiple": 1}}', b'{"KEY": {"dtype": "float32"}}',
-     b'{"KEY": {"dtype": "float32", "tile_width": true, "channel_multiple": "1"}}', b"[" * 50_000],
+     b'{"KEY": {"dtype": "bfloat16", "tile_width": 208, "channel_multiple": 32}}',
+     b'{"KEY": {"dtype": "float32", "tile_width": 0, "channel_multiple": 1, "fourier": false}}',
+     b'{"KEY": {"dtype": "float32"}}',
+     b'{"KEY": {"dtype": "float32", "tile_width": true, "channel_multiple": "1", "fourier": false}}', b"[" * 50_000],
 )  # fmt: skip
 def test_a_damaged_file_counts_as_none_and_is_replaced(content: bytes, measurements: list[Tuning], folder: Path) -> None:
     folder.mkdir()
@@ -58,9 +63,7 @@ def test_a_damaged_file_counts_as_none_and_is_replaced(content: bytes, measureme
     assert tuning.remembered() == CHOICE
 
 
-def test_another_machine_measures_for_itself(
-    measurements: list[Tuning], folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_machine_measures_for_itself(measurements: list[Tuning], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tuning.machine_tuning()
     monkeypatch.setenv("ONEDNN_MAX_CPU_ISA", "AVX2")
     assert tuning.remembered() is None
@@ -77,13 +80,13 @@ def test_a_place_that_cannot_be_written_is_no_hindrance(measurements: list[Tunin
 
 
 def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    def choose(short: float, filled: float, narrow: float) -> Tuning:
+    def choose(short: float, filled: float, narrow: float, fourier: float = 2.0) -> Tuning:
         def seconds(choice: Tuning) -> float:
             kind = (short if choice.dtype == torch.bfloat16 else 1.0) * (filled if choice.channel_multiple == 16 else 1.0)
-            return kind * choice.tile_width * (narrow if choice.tile_width == 144 else 1.0)
+            return kind * (narrow if choice.tile_width == 144 else 1.0) * (fourier if choice.fourier else 1.0)
 
         monkeypatch.setattr(tuning, "_probe", lambda choice: lambda: seconds(choice))
-        chosen, sure = tuning.measured()
+        chosen, sure = tuning.measured(fourier=True)
         assert sure
         return chosen
 
@@ -91,6 +94,9 @@ def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.Mon
     assert choose(0.5, 0.95, 0.97) == Tuning(torch.bfloat16, 272, 1)
     assert choose(0.5, 0.7, 0.97) == Tuning(torch.bfloat16, 272, 16)
     assert choose(0.9, 0.7, 0.6) == Tuning(torch.float32, 144, 16)
+    assert choose(0.9, 1.0, 0.97, 0.95) == Tuning(torch.float32, 272, 1)
+    assert choose(0.9, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.float32)
+    assert choose(0.5, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.bfloat16)
 
 
 def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,8 +108,13 @@ def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytes
 
     monkeypatch.setattr(tuning, "_probe", probe)
     monkeypatch.setattr(tuning, "_BUDGET_SECONDS", 0.0)
-    assert tuning.measured() == (Tuning(torch.bfloat16, 272, 1), False)
+    assert tuning.measured(fourier=False) == (Tuning(torch.bfloat16, 272, 1), False)
     assert timed == [Tuning(torch.float32, 144, 1), Tuning(torch.bfloat16, 144, 1)]
+    timed.clear()
+    tuning.measured(fourier=True)
+    assert [(kind.dtype, kind.fourier) for kind in timed] == [
+        (dtype, fourier) for fourier in (False, True) for dtype in (torch.float32, torch.bfloat16)
+    ]
 
 
 def test_a_choice_made_in_a_hurry_is_not_remembered(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
@@ -116,6 +127,16 @@ def test_it_measures_this_machine_and_leaves_random_numbers_alone() -> None:
     torch.manual_seed(1)
     expected = torch.rand(3)
     torch.manual_seed(1)
-    chosen, _ = tuning.measured(widths=(144, 208), channels=(1,))
+    chosen, _ = tuning.measured(widths=(144, 208), channels=(1,), fourier=False)
     assert chosen.dtype in (torch.float32, torch.bfloat16) and chosen.tile_width in (144, 208)
     assert torch.equal(torch.rand(3), expected)
+
+
+@pytest.mark.usefixtures("compiled_kernels")
+def test_by_fourier_transforms_is_measured_too() -> None:
+    chosen, _ = tuning.measured(widths=(144,), channels=(1,))
+    assert chosen in (
+        *map(Tuning.by_fourier, (torch.float32, torch.bfloat16)),
+        Tuning(torch.float32, 144),
+        Tuning(torch.bfloat16, 144),
+    )

@@ -318,5 +318,3 @@ def _words(steps: int | None) -> str:
     if steps is None:
         return "at an unknown distance"
     return f"{steps} {'step' if steps == 1 else 'steps'} away"
-
-

@@ -91,9 +91,7 @@ def _check_reachable(path: Path) -> None:
         raise InputError(f"{path} is neither a file nor a folder; expected {_KINDS}.")
 
 
-def _open_lytro(
-    path: Path, views: int, progress: Callable[[float], None] | None, cancelled: Callable[[], bool]
-) -> LightField:
+def _open_lytro(path: Path, views: int, progress: Callable[[float], None] | None, cancelled: Callable[[], bool]) -> LightField:
     container = open_container(path)
     contents = read_contents(container)
     if contents.kind is not Kind.CAPTURE:

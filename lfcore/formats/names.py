@@ -123,8 +123,7 @@ def _two_numbers(folder: Path, files: Sequence[Path]) -> Grid:
                 "a light field needs at least two rows and two columns."
             )
         raise InputError(
-            f"{folder} holds {len(files)} pictures ({names}) whose names do not give a row and a column; "
-            f"expected {RULES}."
+            f"{folder} holds {len(files)} pictures ({names}) whose names do not give a row and a column; expected {RULES}."
         )
     indexed = [((values[varying[0]], values[varying[1]]), file) for values, file in zip(numbers, files, strict=True)]
     return _arrange(folder, "folder of views", indexed)

@@ -100,9 +100,7 @@ def _folder_of_views(folder: Path) -> Path:
             f"{folder} holds {len(inner)} folders of pictures ({inner[0].name}, {inner[1].name}, ..); open one of them."
         )
     if any(folder.iterdir()):
-        raise InputError(
-            f"{folder} holds no pictures ({', '.join(EXTENSIONS)}); expected one file per view, named {RULES}."
-        )
+        raise InputError(f"{folder} holds no pictures ({', '.join(EXTENSIONS)}); expected one file per view, named {RULES}.")
     raise InputError(f"{folder} is an empty folder; expected one picture per view, named {RULES}.")
 
 
@@ -175,9 +173,7 @@ def _reverse_rows(views: Pixels) -> None:
 
 def _check_alike(file: Path, header: Header, first: Path, expected: Header) -> None:
     if (header.width, header.height) != (expected.width, expected.height):
-        raise InputError(
-            f"{file} is {header.size} px, but {first.name} is {expected.size} px; all views must have one size."
-        )
+        raise InputError(f"{file} is {header.size} px, but {first.name} is {expected.size} px; all views must have one size.")
     if header.dtype != expected.dtype:
         raise InputError(
             f"{file} stores {header.depth}, but {first.name} stores {expected.depth}; all views must have one depth."

@@ -12,7 +12,18 @@ from types import ModuleType
 import torch
 from torch import Tensor
 
-_FUNCTIONS = ("plane_sweep", "cubic_sample", "compact_disparity", "compact_warp", "compact_blend")
+_FUNCTIONS = (
+    "plane_sweep",
+    "cubic_sample",
+    "fourier_forward",
+    "fourier_backward",
+    "compact_disparity",
+    "compact_warp",
+    "compact_blend",
+)
+
+FOURIER_LEAST_CHANNELS = 16
+_FOURIER_FREQUENCIES = 129  # of a tile of 16 x 16 px: what a real picture has, but for 0
 
 
 def _compiled() -> ModuleType | None:
@@ -87,6 +98,42 @@ def cubic_sample(images: Tensor, x: Tensor, y: Tensor, a: float, outside: bool) 
     addresses = (images.data_ptr(), x.data_ptr(), y.data_ptr(), out.data_ptr())
     _KERNELS.cubic_sample(*addresses, count, channels, height, width, places, a, outside, torch.get_num_threads())
     return out
+
+
+def fourier_forward(x: Tensor, spectra: Tensor, sums: Tensor, step: int, first: int) -> None:
+    """Spectra of tiles of 16 x 16 px, of which each begins `step` px after the last; zeros beyond the picture.
+
+    x: (1, C, H, W), channels_last, float32 or bfloat16, C at least FOURIER_LEAST_CHANNELS. The tiles cover a result of
+    (H - 16 + step, W - 16 + step). spectra: (129, tiles, 2 C), set for the tiles from `first` on, row by row: the
+    real, then the imaginary parts, in the order that lfcore.fourier knows. sums: (tiles, C) float32, frequency 0.
+    """
+    _, _, height, width = x.shape
+    _transform(x, spectra, sums, None, (height - 16 + step, width - 16 + step), step, first)
+
+
+def fourier_backward(spectra: Tensor, sums: Tensor, bias: Tensor, out: Tensor, step: int, first: int) -> None:
+    """The inverse, times 256: of each tile the first `step` x `step` px, with the bias (C,) float32, where positive, else 0.
+
+    out: (1, C, h, w), channels_last, of which the tiles from `first` on are set. Otherwise as `fourier_forward`.
+    """
+    assert bias.shape == (out.shape[1],)
+    _transform(out, spectra, sums, bias, (out.shape[2], out.shape[3]), step, first)
+
+
+def _transform(
+    x: Tensor, spectra: Tensor, sums: Tensor, bias: Tensor | None, result: tuple[int, int], step: int, first: int
+) -> None:
+    assert _KERNELS is not None
+    _, channels, height, width = x.shape
+    frequencies, tiles, parts = spectra.shape
+    assert frequencies == _FOURIER_FREQUENCIES and parts == 2 * channels and channels >= FOURIER_LEAST_CHANNELS
+    assert sums.shape == (tiles, channels)
+    assert first >= 0 and first + tiles <= -(-result[0] // step) * -(-result[1] // step)
+    assert spectra.is_contiguous() and spectra.dtype == x.dtype
+    _check((x,), (sums,) if bias is None else (sums, bias))
+    run = _KERNELS.fourier_forward if bias is None else _KERNELS.fourier_backward
+    addresses = (*_addresses((x, spectra, sums)), 0 if bias is None else bias.data_ptr())
+    run(*addresses, height, width, channels, *result, step, first, tiles, x.dtype == torch.bfloat16, torch.get_num_threads())
 
 
 def compact_disparity(

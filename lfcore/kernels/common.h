@@ -89,6 +89,8 @@ PART void *at_address(unsigned long long address) { return (void *)(uintptr_t)ad
 /* What the module offers; lfcore/kernels/__init__.py says what each does. */
 PyObject *plane_sweep(PyObject *module, PyObject *arguments); /* sweep.c */
 PyObject *cubic_sample(PyObject *module, PyObject *arguments); /* sample.c */
+PyObject *fourier_forward(PyObject *module, PyObject *arguments); /* fourier.c */
+PyObject *fourier_backward(PyObject *module, PyObject *arguments); /* fourier.c */
 PyObject *compact_disparity(PyObject *module, PyObject *arguments); /* compact_disparity.c */
 PyObject *compact_warp(PyObject *module, PyObject *arguments); /* compact_warp.c */
 PyObject *compact_blend(PyObject *module, PyObject *arguments); /* compact_blend.c */

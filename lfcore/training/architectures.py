@@ -172,9 +172,7 @@ class CompactPair:
         """The disparity alone, (sum of B, 1, P, P): what another model can be taught."""
         return self._disparity(model, batch, _places(batch), autocast)
 
-    def _disparity(
-        self, model: CompactModel, batch: Batch, places: Sequence[_Place], autocast: Autocast
-    ) -> Tensor:
+    def _disparity(self, model: CompactModel, batch: Batch, places: Sequence[_Place], autocast: Autocast) -> Tensor:
         features = _half_sweep(places, batch, model.config.levels)
         with autocast():
             disparity: Tensor = model.disparity(features)  # (., 1, P, P)

@@ -100,9 +100,7 @@ def _in_turn(count: int, seed: int, textures: Textures, config: SceneConfig) -> 
         yield generate_scene(seed + k, textures, config)
 
 
-def _in_processes(
-    count: int, seed: int, textures: Textures, config: SceneConfig, workers: int
-) -> Iterator[GeneratedScene]:
+def _in_processes(count: int, seed: int, textures: Textures, config: SceneConfig, workers: int) -> Iterator[GeneratedScene]:
     # Forking a process in which torch has started threads may hang it; a fresh one costs a second.
     with ProcessPoolExecutor(workers, get_context("spawn"), _start_worker, (textures, config)) as pool:
         waiting: dict[int, Future[GeneratedScene]] = {}

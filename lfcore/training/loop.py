@@ -253,9 +253,7 @@ class Trainer:
         self._curve.append(point)
         return point
 
-    def save(
-        self, out: Path, scenes: Sequence[LightField], generated: int, validation: Sequence[LightField]
-    ) -> None:
+    def save(self, out: Path, scenes: Sequence[LightField], generated: int, validation: Sequence[LightField]) -> None:
         """Checkpoint, curve, and the weights if they are the best so far."""
         best = max(self._curve, key=lambda point: point.mean)
         if best is self._curve[-1] or not validation:

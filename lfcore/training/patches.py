@@ -90,9 +90,7 @@ def check_room(scenes: Sequence[TrainingScene], config: PatchConfig, levels: Lev
             )
 
 
-def mixed(
-    captured: Sequence[TrainingScene], generated: Sequence[TrainingScene], generated_share: float
-) -> list[TrainingScene]:
+def mixed(captured: Sequence[TrainingScene], generated: Sequence[TrainingScene], generated_share: float) -> list[TrainingScene]:
     """All scenes, weighted so that generated ones make `generated_share` of what is drawn (all, or none, if there is but one
     kind)."""
     share = generated_share if captured else 1.0
@@ -101,9 +99,7 @@ def mixed(
     return [replace(scene, weight=part / len(scenes)) for scenes, part in parts for scene in scenes if part > 0]
 
 
-def sample_group(
-    scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels, rng: np.random.Generator
-) -> PatchGroup:
+def sample_group(scenes: Sequence[TrainingScene], config: PatchConfig, levels: Levels, rng: np.random.Generator) -> PatchGroup:
     """Draw one group. The same `rng` state gives the same group."""
     u, v = _draw_viewpoint(_draw_scene(scenes, rng), rng)
     eligible = [scene for scene in scenes if _spacings(scene, u, v)]
@@ -185,10 +181,7 @@ def _draw_views(
         y0 = int(rng.integers(room_y + 1)) + max(shear, 0) * spacing
         x0 = int(rng.integers(room_x + 1)) + max(shear, 0) * spacing
         views = np.stack(
-            [
-                field.views[row0 + r, column0 + c, y0 - shear * r :, x0 - shear * c :][: shape[0], : shape[1]]
-                for r, c in steps
-            ]
+            [field.views[row0 + r, column0 + c, y0 - shear * r :, x0 - shear * c :][: shape[0], : shape[1]] for r, c in steps]
         )
         score = _difference(views)
         if score > best_score:
@@ -203,9 +196,7 @@ def _difference(views: npt.NDArray[np.generic]) -> float:
     return float(np.abs(thinned[0] - thinned[3]).mean() + np.abs(thinned[1] - thinned[2]).mean())
 
 
-def _draw_shear(
-    scene: TrainingScene, spacing: int, levels: Levels, config: PatchConfig, rng: np.random.Generator
-) -> int:
+def _draw_shear(scene: TrainingScene, spacing: int, levels: Levels, config: PatchConfig, rng: np.random.Generator) -> int:
     """Whole pixels per view that bring the scene's middle near a disparity drawn around the middle of the levels, within
     them."""
     scale = spacing / scene.spacing

@@ -95,4 +95,3 @@ def _name(part: bytes | str) -> str:
 
 def _tags(dark: bool, white: bool) -> Json:
     return {"vendorContent": {"com.lytro.tags": {"darkFrame": dark, "modulationFrame": white}}}
-

@@ -354,4 +354,3 @@ def _colour_matrix(colour: Fields) -> Matrix3:
         return _NEUTRAL
     rows = [(values[row], values[row + 1], values[row + 2]) for row in (0, 3, 6)]
     return rows[0], rows[1], rows[2]
-

@@ -256,7 +256,7 @@ def _draw_glint(
         angle, long, short = rng.uniform(0, np.pi), rng.uniform(2, 14), rng.uniform(1.2, 5)
         dx, dy = x - float(places[1][middle]), y - float(places[0][middle])
         along, across = dx * math.cos(angle) + dy * math.sin(angle), dy * math.cos(angle) - dx * math.sin(angle)
-        spots += torch.exp(-((along / long).square() + (across / short).square()) ** rng.uniform(0.8, 2.5))
+        spots += torch.exp(-(((along / long).square() + (across / short).square()) ** rng.uniform(0.8, 2.5)))
     strength = rng.uniform(0.3, 4) * max(float(picture.numpy()[::4, ::4].mean()), 0.05)
     limit = config.largest_disparity
     offset = rng.uniform(0.1, 0.4) * rng.choice((-1, 1)) * (1 + float(grid.max() - grid.min()) + rng.uniform(0, 8))

@@ -140,9 +140,7 @@ def _draw_leaf(
     _put_over(alpha, shade, (slice(top, bottom), slice(left, right)), cover, tone)
 
 
-def _put_over(
-    alpha: FloatArray, shade: FloatArray, area: tuple[slice, slice], cover: FloatArray, tone: FloatArray
-) -> None:
+def _put_over(alpha: FloatArray, shade: FloatArray, area: tuple[slice, slice], cover: FloatArray, tone: FloatArray) -> None:
     shade[area] += cover * (tone - shade[area])
     alpha[area] = np.maximum(alpha[area], cover)
 
@@ -283,9 +281,7 @@ def _periodic_distance(place: Tensor, period: float) -> tuple[Tensor, Tensor]:
     return signed.abs(), signed
 
 
-def _place(
-    shape: tuple[int, int], rng: np.random.Generator, smallest: float, largest: float
-) -> tuple[Tensor, Tensor, float]:
+def _place(shape: tuple[int, int], rng: np.random.Generator, smallest: float, largest: float) -> tuple[Tensor, Tensor, float]:
     """Coordinates in px about a random middle, and a size in px."""
     height, width = shape
     y = torch.arange(height, dtype=torch.float32)[:, None] - rng.uniform(0.1, 0.9) * height

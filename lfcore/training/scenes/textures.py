@@ -26,9 +26,7 @@ _SMALLEST_SIDE = 128  # px; smaller pictures are icons, not photographs
 _CACHE_BYTES = 384 * 2**20
 
 _VALUES = np.arange(256) / 255
-_LINEAR = torch.from_numpy(
-    np.where(_VALUES <= 0.04045, _VALUES / 12.92, ((_VALUES + 0.055) / 1.055) ** 2.4).astype(np.float32)
-)
+_LINEAR = torch.from_numpy(np.where(_VALUES <= 0.04045, _VALUES / 12.92, ((_VALUES + 0.055) / 1.055) ** 2.4).astype(np.float32))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,210 @@
+/* Fourier transforms of tiles of 16 x 16 pixels, and back, for lfcore.fourier, which multiplies between them.
+ *
+ * Sixteen channels lie in the lanes of a register, so that the transforms are plain arithmetic on registers. The last sixteen
+ * overlap those before them where the number of channels is not a multiple.
+ */
+#include "tiled.h"
+
+#define SIZE 16 /* of a tile, px */
+
+/* Of the angles 2 pi n / 16. */
+static const float COSINES[10] = {1.0f,           0.92387953251f,  0.70710678119f,  0.38268343236f, 0.0f,
+                                  -0.38268343236f, -0.70710678119f, -0.92387953251f, -1.0f,          -0.92387953251f};
+static const float SINES[10] = {0.0f,           0.38268343236f, 0.70710678119f, 0.92387953251f, 1.0f,
+                                0.92387953251f, 0.70710678119f, 0.38268343236f, 0.0f,           -0.38268343236f};
+
+/* Transform of four complex numbers, in place. The inverse, here and below: with re and im exchanged. */
+PART void four(Sixteen *re, Sixteen *im, int a, int b, int c, int d) {
+    const Sixteen r0 = re[a] + re[c], r1 = re[a] - re[c], r2 = re[b] + re[d], r3 = re[b] - re[d];
+    const Sixteen i0 = im[a] + im[c], i1 = im[a] - im[c], i2 = im[b] + im[d], i3 = im[b] - im[d];
+    re[a] = r0 + r2, im[a] = i0 + i2;
+    re[b] = r1 + i3, im[b] = i1 - r3;
+    re[c] = r0 - r2, im[c] = i0 - i2;
+    re[d] = r1 - i3, im[d] = i1 + r3;
+}
+
+/* Times exp(-i angle). */
+PART void turn(Sixteen *re, Sixteen *im, float cosine, float sine) {
+    const Sixteen r = *re, i = *im;
+    *re = r * cosine + i * sine;
+    *im = i * cosine - r * sine;
+}
+
+/* Transform of 16 complex numbers, in place: frequency k comes out at PLACE(k). */
+#define PLACE(k) (4 * ((k) % 4) + (k) / 4)
+PART void sixteen_complex(Sixteen *re, Sixteen *im) {
+    for (int n = 0; n < 4; ++n) four(re, im, n, n + 4, n + 8, n + 12);
+    for (int n = 1; n < 4; ++n)
+        for (int k = 1; k < 4; ++k) turn(re + n + 4 * k, im + n + 4 * k, COSINES[n * k], SINES[n * k]);
+    for (int k = 0; k < 4; ++k) four(re, im, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3);
+}
+
+/* Transform of 16 real numbers, in place: frequencies 0 and 8, which are real, come out at 0 and 1, frequency k between them at
+ * 2 k and 2 k + 1. The even ones are those of 8 real numbers, x(n) + x(n + 8); the odd ones, with x(n) - x(n + 8), those of 4
+ * complex ones. The former likewise. */
+PART void sixteen_real(Sixteen *x) {
+    Sixteen re[4], im[4], sums[8], sums_of_four[4];
+    for (int n = 0; n < 4; ++n) {
+        re[n] = x[n] - x[n + 8], im[n] = x[n + 12] - x[n + 4];
+        turn(re + n, im + n, COSINES[n], SINES[n]);
+    }
+    for (int n = 0; n < 8; ++n) sums[n] = x[n] + x[n + 8];
+    four(re, im, 0, 1, 2, 3); /* frequencies 1, 5, 9, 13; the last two are those of 7 and 3, conjugated */
+    x[2] = re[0], x[3] = im[0], x[10] = re[1], x[11] = im[1];
+    x[14] = re[2], x[15] = -im[2], x[6] = re[3], x[7] = -im[3];
+    const Sixteen r0 = sums[0] - sums[4], i0 = sums[6] - sums[2];
+    Sixteen r1 = sums[1] - sums[5], i1 = sums[7] - sums[3];
+    turn(&r1, &i1, COSINES[2], SINES[2]);
+    x[4] = r0 + r1, x[5] = i0 + i1, x[12] = r0 - r1, x[13] = i1 - i0; /* 2, and 6 as 10 conjugated */
+    for (int n = 0; n < 4; ++n) sums_of_four[n] = sums[n] + sums[n + 4];
+    const Sixteen even = sums_of_four[0] + sums_of_four[2], odd = sums_of_four[1] + sums_of_four[3];
+    x[8] = sums_of_four[0] - sums_of_four[2], x[9] = sums_of_four[3] - sums_of_four[1];
+    x[0] = even + odd, x[1] = even - odd;
+}
+
+/* The inverse of `sixteen_real`, times 16. */
+PART void real_sixteen(Sixteen *x) {
+    Sixteen re[4] = {x[2], x[10], x[14], x[6]}, im[4] = {x[3], x[11], -x[15], -x[7]};
+    four(im, re, 0, 1, 2, 3);
+    for (int n = 0; n < 4; ++n) turn(im + n, re + n, 2.0f * COSINES[n], 2.0f * SINES[n]);
+    const Sixteen r0 = 2.0f * (x[4] + x[12]), i0 = 2.0f * (x[5] - x[13]);
+    Sixteen r1 = x[4] - x[12], i1 = x[5] + x[13];
+    turn(&i1, &r1, 2.0f * COSINES[2], 2.0f * SINES[2]);
+    const Sixteen low = x[0] + x[1], high = x[0] - x[1], r = 2.0f * x[8], i = 2.0f * x[9];
+    const Sixteen fours[4] = {low + r, high - i, low - r, high + i}, eights[4] = {r0, r1, -i0, -i1};
+    for (int n = 0; n < 4; ++n) {
+        const Sixteen first = fours[n] + eights[n], second = fours[n] - eights[n];
+        x[n] = first + re[n], x[n + 8] = first - re[n];
+        x[n + 4] = second - im[n], x[n + 12] = second + im[n];
+    }
+}
+
+/* Frequencies of a tile: of columns 1 to 7 all 16; then 1 to 8 of column 0, and 0 to 8 of column 8, which are those of real
+ * numbers. What is left is the sum of all pixels, kept by itself. */
+#define FIRST_EDGE (7 * SIZE)
+#define LAST_EDGE (FIRST_EDGE + 8)
+
+typedef struct {
+    Tiling picture;
+    void *spectra; /* (129, tiles, 2 channels): real, then imaginary parts, of the picture's type */
+    float *sums; /* (tiles, channels): frequency 0, which is large, and in bfloat16 would lose most */
+    Py_ssize_t first, tiles; /* of the tiles of the picture */
+    const float *bias; /* (channels); backward only */
+} Fourier;
+
+PART Py_ssize_t spectrum_place(const Fourier *f, Py_ssize_t frequency, Py_ssize_t tile) {
+    return (frequency * f->tiles + tile) * 2 * f->picture.channels;
+}
+
+PART void put(const Fourier *f, Py_ssize_t place, Sixteen re, Sixteen im) {
+    write_sixteen(re, f->spectra, place, f->picture.halved);
+    write_sixteen(im, f->spectra, place + f->picture.channels, f->picture.halved);
+}
+
+PART Sixteen spectrum_at(const Fourier *f, Py_ssize_t place) {
+    return f->picture.halved ? from_halves((const uint16_t *)f->spectra + place) : sixteen_at((const float *)f->spectra + place);
+}
+
+PART void forward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssize_t channel) {
+    Sixteen work[SIZE][SIZE], re[SIZE], im[SIZE];
+    const Sixteen none = {0.0f};
+    for (int y = 0; y < SIZE; ++y) {
+        read_row(&f->picture, at.top + y, at.left, channel, SIZE, work[y]);
+        sixteen_real(work[y]);
+    }
+    const Py_ssize_t next = spectrum_place(f, 1, 0), own = spectrum_place(f, 0, tile) + channel;
+    for (int k = 1; k < 8; ++k) {
+        for (int y = 0; y < SIZE; ++y) re[y] = work[y][2 * k], im[y] = work[y][2 * k + 1];
+        sixteen_complex(re, im);
+        for (int y = 0; y < SIZE; ++y) put(f, own + ((k - 1) * SIZE + y) * next, re[PLACE(y)], im[PLACE(y)]);
+    }
+    for (int y = 0; y < SIZE; ++y) re[y] = work[y][0], im[y] = work[y][1];
+    sixteen_real(re);
+    sixteen_real(im);
+    memcpy(f->sums + tile * f->picture.channels + channel, &re[0], sizeof re[0]);
+    put(f, own + (LAST_EDGE + 0) * next, im[0], none);
+    put(f, own + (FIRST_EDGE + 7) * next, re[1], none);
+    put(f, own + (LAST_EDGE + 8) * next, im[1], none);
+    for (int k = 1; k < 8; ++k) {
+        put(f, own + (FIRST_EDGE + k - 1) * next, re[2 * k], re[2 * k + 1]);
+        put(f, own + (LAST_EDGE + k) * next, im[2 * k], im[2 * k + 1]);
+    }
+}
+
+/* From sums over the channels that were read: their pixels, with the bias, rectified. */
+PART void backward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssize_t channel) {
+    Sixteen work[SIZE][SIZE], re[SIZE], im[SIZE];
+    const Tiling *t = &f->picture;
+    const Py_ssize_t next = spectrum_place(f, 1, 0), own = spectrum_place(f, 0, tile) + channel;
+    for (int k = 1; k < 8; ++k) {
+        for (int y = 0; y < SIZE; ++y) {
+            const Py_ssize_t place = own + ((k - 1) * SIZE + y) * next;
+            re[y] = spectrum_at(f, place), im[y] = spectrum_at(f, place + t->channels);
+        }
+        sixteen_complex(im, re);
+        for (int y = 0; y < SIZE; ++y) work[y][2 * k] = re[PLACE(y)], work[y][2 * k + 1] = im[PLACE(y)];
+    }
+    re[0] = sixteen_at(f->sums + tile * t->channels + channel), im[0] = spectrum_at(f, own + LAST_EDGE * next);
+    re[1] = spectrum_at(f, own + (FIRST_EDGE + 7) * next), im[1] = spectrum_at(f, own + (LAST_EDGE + 8) * next);
+    for (int k = 1; k < 8; ++k) {
+        const Py_ssize_t first = own + (FIRST_EDGE + k - 1) * next, last = own + (LAST_EDGE + k) * next;
+        re[2 * k] = spectrum_at(f, first), re[2 * k + 1] = spectrum_at(f, first + t->channels);
+        im[2 * k] = spectrum_at(f, last), im[2 * k + 1] = spectrum_at(f, last + t->channels);
+    }
+    real_sixteen(re);
+    real_sixteen(im);
+    for (int y = 0; y < SIZE; ++y) work[y][0] = re[y], work[y][1] = im[y];
+    const Sixteen bias = sixteen_at(f->bias + channel), none = {0.0f};
+    const Py_ssize_t rows = at_most(t->step, t->height - at.top), columns = at_most(t->step, t->width - at.left);
+    for (Py_ssize_t y = 0; y < rows; ++y) {
+        real_sixteen(work[y]);
+        for (Py_ssize_t x = 0; x < columns; ++x) {
+            const Sixteen value = work[y][x] + bias;
+            const Py_ssize_t pixel = (at.top + y) * t->width + at.left + x;
+            write_sixteen((Sixteen)((SixteenBits)value & (SixteenBits)(value > none)), t->pixels, pixel * t->channels + channel,
+                          t->halved);
+        }
+    }
+}
+
+MANY_PROCESSORS
+static void forward(const Fourier *f, Py_ssize_t tile) {
+    const Place at = tile_place(&f->picture, f->first + tile);
+    const Py_ssize_t last = f->picture.channels - 16;
+    for (Py_ssize_t channel = 0; channel < last + 16; channel += 16) forward_channels(f, tile, at, at_most(channel, last));
+}
+
+MANY_PROCESSORS
+static void backward(const Fourier *f, Py_ssize_t tile) {
+    const Place at = tile_place(&f->picture, f->first + tile);
+    const Py_ssize_t last = f->picture.channels - 16;
+    for (Py_ssize_t channel = 0; channel < last + 16; channel += 16) backward_channels(f, tile, at, at_most(channel, last));
+}
+
+static void all_tiles(const Fourier *f, void (*step)(const Fourier *, Py_ssize_t), int threads) {
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
+    for (Py_ssize_t tile = 0; tile < f->tiles; ++tile) step(f, tile);
+}
+
+/* Arguments of both, and the step itself. */
+static PyObject *transform(PyObject *arguments, void (*step)(const Fourier *, Py_ssize_t)) {
+    Fourier f;
+    Tiling *t = &f.picture;
+    unsigned long long pixels, spectra, sums, bias;
+    int threads;
+    if (!PyArg_ParseTuple(arguments, "KKKKnnnnnnnnpi", &pixels, &spectra, &sums, &bias, &t->height, &t->width, &t->channels,
+                          &t->result_height, &t->result_width, &t->step, &f.first, &f.tiles, &t->halved, &threads))
+        return NULL;
+    t->pixels = at_address(pixels);
+    f.spectra = at_address(spectra);
+    f.sums = at_address(sums);
+    f.bias = at_address(bias);
+    Py_BEGIN_ALLOW_THREADS
+    all_tiles(&f, step, threads);
+    Py_END_ALLOW_THREADS
+    Py_RETURN_NONE;
+}
+
+PyObject *fourier_forward(PyObject *Py_UNUSED(module), PyObject *arguments) { return transform(arguments, forward); }
+
+PyObject *fourier_backward(PyObject *Py_UNUSED(module), PyObject *arguments) { return transform(arguments, backward); }
