@@ -126,9 +126,7 @@ class Comparing:
         self._instant = (picture, image)
         self.instant_wanted = False
 
-    def _partner_of(
-        self, light_field: LightField, picture: Answer | None, source: Source, mapped: bool
-    ) -> FloatArray | None:
+    def _partner_of(self, light_field: LightField, picture: Answer | None, source: Source, mapped: bool) -> FloatArray | None:
         """What the picture is to be measured against; None where there is nothing to be measured, or not yet."""
         self.instant_wanted = False
         if picture is None or not picture.final:

@@ -100,9 +100,7 @@ def focus_limits(span: tuple[float, float] | None) -> tuple[float, float]:
     return float(np.floor(low - margin)), float(np.ceil(high + margin))
 
 
-def carried_disparity(
-    disparity_map: npt.NDArray[np.float32], made_at: Point, viewpoint: Point, point: Point
-) -> float | None:
+def carried_disparity(disparity_map: npt.NDArray[np.float32], made_at: Point, viewpoint: Point, point: Point) -> float | None:
     """The disparity at a picture point seen from the viewpoint, px over the baseline; None outside the picture.
 
     disparity_map: (H, W), made for the viewpoint `made_at`. As shaders/carry.glsl, for one point: what lies in front holds.

@@ -49,7 +49,5 @@ def with_strips(layout: Layout, scale: float) -> Layout:
     width, height = area.width - extent - gap, area.height - extent - gap
     if min(width, height) < 2 * extent:
         return layout
-    strips = Strips(
-        Rect(area.x, area.y + height + gap, width, extent), Rect(area.x + width + gap, area.y, extent, height)
-    )
+    strips = Strips(Rect(area.x, area.y + height + gap, width, extent), Rect(area.x + width + gap, area.y, extent, height))
     return replace(layout, picture=Rect(area.x, area.y, width, height), strips=strips)

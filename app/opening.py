@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from lfcore.thumbnails import ThumbnailStore
 
 
-
 def open_by_content(
     path: Path, progress: Callable[[float], None], cancelled: Callable[[], bool]
 ) -> LightField | Exhibition | Folder:

@@ -121,9 +121,7 @@ def _window(
 ) -> Iterator[tuple[_Window, Controller]]:
     """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
     window = _Window(keeping.settings.window if keeping is not None else None)
-    controller = Controller(
-        engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview, models=models
-    )
+    controller = Controller(engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview, models=models)
     surroundings = Surroundings(controller, glfw.post_empty_event, keeping)
 
     def stop() -> None:

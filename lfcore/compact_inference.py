@@ -6,17 +6,14 @@ the given type, scales of their inputs stand in their weights, and pictures are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfcore.compact import CompactModel, ResidualBlock, log_nearness
 from lfcore.compact_parts import MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
-
-Layer = Callable[[Tensor], Tensor]
+from lfcore.layers import Layer, fastest_layer
 
 # The scales that CompactDisparity gives its features, without the shift, which `sweep_input` gives.
 _MEAN_SCALE, _MEAN_SHIFT, _DEVIATION_SCALE = 4.0, -2.0, 10.0
@@ -75,8 +72,9 @@ class CompactInference:
     def disparity(self, features: Tensor) -> Tensor:
         """(1, 2 L, h, w) of the sweep over `sweep_input`, channels_last, to the phases (4, h, w) of the disparity, px."""
         coarse = _residuals(self._stem(features), self._blocks)
-        fine = _side_by_side(self._rise(coarse.relu_())).add_(self._skip(features)).relu_()
-        return self._parts.disparity(self._join(fine).add_(fine).relu_(), features)
+        risen = _side_by_side(self._rise(coarse, of_positive=True, positive=True))
+        fine = self._skip(features, plus=risen, positive=True)
+        return self._parts.disparity(self._join(fine, plus=fine, positive=True), features)
 
     def warp(self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]) -> Gathered:
         """`prepared` corners, continued by `reach` px, warped by the phases of a disparity. offsets: (4, 2), p_i - q;
@@ -116,12 +114,12 @@ def _layer(
         weight = weight * scale.view(1, -1, 1, 1)
     if inputs is not None:
         weight = weight[:, inputs]
+    bias = None if bias is None else bias.detach()
     if outputs is not None:
         weight, bias = weight[outputs], None if bias is None else bias[outputs]
-    weight = weight.to(dtype=dtype, memory_format=torch.channels_last)
-    bias = None if bias is None else bias.detach().to(dtype)
-    stride, padding, dilation = convolution.stride, convolution.padding, convolution.dilation
-    return lambda x: F.conv2d(x, weight, bias, stride, padding, dilation)
+    padding = convolution.padding[0]
+    assert isinstance(padding, int)
+    return fastest_layer(weight, bias, dtype, convolution.stride[0], padding, convolution.dilation[0])
 
 
 def _block_layers(blocks: nn.Sequential, dtype: torch.dtype) -> list[tuple[Layer, Layer]]:
@@ -136,12 +134,12 @@ def _matrix(convolution: nn.Conv2d) -> tuple[Tensor, Tensor]:
 
 def _residuals(x: Tensor, blocks: list[tuple[Layer, Layer]]) -> Tensor:
     for first, second in blocks:
-        x.add_(second(first(x.relu()).relu_()))
+        x = second(first(x, of_positive=True, positive=True), plus=x)
     return x
 
 
 def _side_by_side(phases: Tensor) -> Tensor:
-    """(1, 4 C, h, w), by phase and channel, rectified, to (1, C, 2 h, 2 w); both channels_last."""
+    """(1, 4 C, h, w), by phase and channel, to (1, C, 2 h, 2 w); both channels_last."""
     _, channels, h, w = phases.shape
-    pixels = phases.relu_().permute(0, 2, 3, 1).view(h, w, 2, 2, channels // 4)
+    pixels = phases.permute(0, 2, 3, 1).view(h, w, 2, 2, channels // 4)
     return pixels.transpose(1, 2).reshape(1, 2 * h, 2 * w, channels // 4).permute(0, 3, 1, 2)

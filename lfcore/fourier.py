@@ -9,6 +9,8 @@ products torch's.
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 
@@ -51,8 +53,9 @@ class FourierConvolution:
             dtype=self.dtype,
             memory_format=torch.channels_last,
         )
-        count = -(-out.shape[2] // step) * -(-out.shape[3] // step)
-        at_once = -(-count // -(-count // _TILES))  # blocks of about equal size
+        count = math.ceil(out.shape[2] / step) * math.ceil(out.shape[3] / step)
+        # Blocks of about equal size, an odd number of tiles: frequencies should not all fall on the same places of a cache.
+        at_once = math.ceil(count / math.ceil(count / _TILES)) | 1
         spectra = torch.empty(frequencies * at_once * 2 * channels, dtype=self.dtype)
         products = torch.empty(frequencies * at_once * outputs, dtype=self.dtype)
         for first in range(0, count, at_once):

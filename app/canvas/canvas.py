@@ -325,9 +325,7 @@ class Canvas:
         if frame.look is Look.SWEEP_DEVIATION:
             return makers.inside.sweep_deviation(frame.viewpoint, frame.level)
         if frame.look is Look.ERROR:
-            return makers.compared.difference(
-                frame.viewpoint, frame.share, frame.partner, frame.difference, frame.gain
-            )
+            return makers.compared.difference(frame.viewpoint, frame.share, frame.partner, frame.difference, frame.gain)
         if frame.look is Look.ANAGLYPH:
             return makers.stereo.anaglyph(frame.viewpoint, frame.focusing, tone)
         if frame.look.is_stereo:

@@ -31,9 +31,7 @@ _BETTER = 0.05  # of the baseline: a synthesis this much nearer is worth drawing
 class Gathered(ABC):
     """Views at the crossings of a grid over the square of viewpoints. `columns_at`, `rows_at`: their u and v."""
 
-    def __init__(
-        self, context: moderngl.Context, size: Size, columns_at: Sequence[float], rows_at: Sequence[float]
-    ) -> None:
+    def __init__(self, context: moderngl.Context, size: Size, columns_at: Sequence[float], rows_at: Sequence[float]) -> None:
         self.size = size
         self.columns_at, self.rows_at = tuple(columns_at), tuple(rows_at)
         self.positions = np.array([(u, v) for v in rows_at for u in columns_at])  # (N, 2)
@@ -122,9 +120,7 @@ class Captured(Gathered):
 class Synthesized(Gathered):
     """Views in between, drawn from what is at hand as app.canvas.elsewhere has it; anew when a nearer synthesis comes."""
 
-    def __init__(
-        self, context: moderngl.Context, passes: Passes, textures: Textures, most_bytes: int = MOST_BYTES
-    ) -> None:
+    def __init__(self, context: moderngl.Context, passes: Passes, textures: Textures, most_bytes: int = MOST_BYTES) -> None:
         largest = int(context.info["GL_MAX_TEXTURE_SIZE"])
         side = len(kept((SYNTHESIZED_SIDE, SYNTHESIZED_SIDE), textures.size, largest, most_bytes)[0])
         places = np.linspace(0, 1, side).tolist()

@@ -200,9 +200,7 @@ class _Sums:
             each.release()
 
 
-def coarse_views(
-    weights: npt.NDArray[np.float64], positions: npt.NDArray[np.float64], wanted: Wanted
-) -> npt.NDArray[np.intp]:
+def coarse_views(weights: npt.NDArray[np.float64], positions: npt.NDArray[np.float64], wanted: Wanted) -> npt.NDArray[np.intp]:
     """The numbers of _COARSE views, some of them repeated, that are spread over the aperture as evenly as can be.
 
     weights: (N,), 0 for views that are not there or not inside. The points of a sunflower (Vogel 1979), each moved to the

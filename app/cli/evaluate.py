@@ -55,9 +55,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument(
         "--grid", action="store_true", help="score every novel view of the grid too, for the report's heat maps and the JSON"
     )
-    parser.add_argument(
-        "--noise", action="store_true", help="measure the noise of synthesis and captured view on flat regions"
-    )
+    parser.add_argument("--noise", action="store_true", help="measure the noise of synthesis and captured view on flat regions")
     parser.add_argument(
         "--json", metavar="FILE", help="write the scores as JSON (-: standard output), a list if there are several models"
     )

@@ -76,9 +76,7 @@ def _stereo(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     hint = "Between the eyes, in baselines of the light field.  (Shift+J: the next)"
     baseline = slider("Baseline", focusing.baseline, BASELINE_LIMITS, number(focusing.baseline, 2), hint)
     hint = "The disparity that both eyes see at the same place, on the screen's own plane; px over the baseline.  ([ and ])"
-    convergence = slider(
-        "Screen", focusing.convergence, readout.focus.limits, f"{number(focusing.convergence, 2)} px", hint
-    )
+    convergence = slider("Screen", focusing.convergence, readout.focus.limits, f"{number(focusing.convergence, 2)} px", hint)
     if _moved(focusing.baseline, baseline) or _moved(focusing.convergence, convergence):
         state.focusing = replace(state.focusing, baseline=baseline, convergence=convergence)
 

@@ -7,6 +7,7 @@ on the CPU.
 
 from __future__ import annotations
 
+import math
 from types import ModuleType
 
 import torch
@@ -17,13 +18,16 @@ _FUNCTIONS = (
     "cubic_sample",
     "fourier_forward",
     "fourier_backward",
+    "winograd_convolution",
     "compact_disparity",
     "compact_warp",
     "compact_blend",
 )
 
-FOURIER_LEAST_CHANNELS = 16
+FOURIER_LEAST_CHANNELS = 16  # as many as lie in a register
 _FOURIER_FREQUENCIES = 129  # of a tile of 16 x 16 px: what a real picture has, but for 0
+WINOGRAD_LEAST_CHANNELS = 8
+WINOGRAD_COLUMNS = 16  # channels out that are computed together
 
 
 def _compiled() -> ModuleType | None:
@@ -124,16 +128,47 @@ def _transform(
     x: Tensor, spectra: Tensor, sums: Tensor, bias: Tensor | None, result: tuple[int, int], step: int, first: int
 ) -> None:
     assert _KERNELS is not None
-    _, channels, height, width = x.shape
+    batch, channels, height, width = x.shape
     frequencies, tiles, parts = spectra.shape
-    assert frequencies == _FOURIER_FREQUENCIES and parts == 2 * channels and channels >= FOURIER_LEAST_CHANNELS
+    assert frequencies == _FOURIER_FREQUENCIES and parts == 2 * channels and channels >= FOURIER_LEAST_CHANNELS and batch == 1
     assert sums.shape == (tiles, channels)
-    assert first >= 0 and first + tiles <= -(-result[0] // step) * -(-result[1] // step)
+    assert first >= 0 and first + tiles <= math.ceil(result[0] / step) * math.ceil(result[1] / step)
     assert spectra.is_contiguous() and spectra.dtype == x.dtype
     _check((x,), (sums,) if bias is None else (sums, bias))
     run = _KERNELS.fourier_forward if bias is None else _KERNELS.fourier_backward
     addresses = (*_addresses((x, spectra, sums)), 0 if bias is None else bias.data_ptr())
     run(*addresses, height, width, channels, *result, step, first, tiles, x.dtype == torch.bfloat16, torch.get_num_threads())
+
+
+def winograd_convolution(
+    x: Tensor,
+    weights: Tensor,
+    bias: Tensor,
+    plus: Tensor | None,
+    out: Tensor,
+    padding: int,
+    dilation: int,
+    of_positive: bool,
+    positive: bool,
+) -> None:
+    """A convolution with 3 x 3 kernels, as lfcore.layers.Layer describes it, from kernels that are transformed already.
+
+    x: (1, C, H, W) float32, channels_last. weights: (36, groups, C, WINOGRAD_COLUMNS) float32, the channels out in groups,
+    filled up with zeros. bias: (O,) float32. plus: like `out`, or None. out: (1, O, H - 2 (dilation - padding), W - ...)
+    float32, channels_last, not x. C and O are at least WINOGRAD_LEAST_CHANNELS.
+    """
+    assert _KERNELS is not None
+    (batch, channels, height, width), (_, outputs, *size) = x.shape, out.shape
+    places, groups, inputs, columns = weights.shape
+    assert places == 36 and inputs == channels and columns == WINOGRAD_COLUMNS and 0 <= groups * columns - outputs < columns
+    assert batch == 1 and min(channels, outputs) >= WINOGRAD_LEAST_CHANNELS and bias.shape == (outputs,)
+    lost = 2 * (dilation - padding)
+    assert size == [height - lost, width - lost] and min(size) > 0 and padding >= 0 and dilation >= 1
+    assert x.dtype == torch.float32 and (plus is None or plus.shape == out.shape)
+    _check((x, out) if plus is None else (x, out, plus), (weights, bias))
+    addresses = (*_addresses((x, weights, bias)), 0 if plus is None else plus.data_ptr(), out.data_ptr())
+    sizes = (height, width, channels, padding, groups, outputs, *size, dilation)
+    _KERNELS.winograd_convolution(*addresses, *sizes, of_positive, positive, torch.get_num_threads())
 
 
 def compact_disparity(

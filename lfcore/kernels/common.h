@@ -59,9 +59,18 @@ PART Four four_at(const float *values) {
     return four;
 }
 
-/* A part of a row, as wide as the widest registers. */
+/* As wide as the registers of most processors. What is wider is slow on them: compilers then take it apart through memory. */
+typedef float Eight __attribute__((vector_size(32)));
+typedef int32_t EightWhole __attribute__((vector_size(32)));
+
+PART Eight eight_at(const float *values) {
+    Eight eight;
+    memcpy(&eight, values, sizeof eight);
+    return eight;
+}
+
+/* As wide as the widest registers, for plain arithmetic that gains from them. */
 typedef float Sixteen __attribute__((vector_size(64)));
-typedef int32_t SixteenWhole __attribute__((vector_size(64)));
 
 PART Sixteen sixteen_at(const float *values) {
     Sixteen sixteen;
@@ -91,6 +100,7 @@ PyObject *plane_sweep(PyObject *module, PyObject *arguments); /* sweep.c */
 PyObject *cubic_sample(PyObject *module, PyObject *arguments); /* sample.c */
 PyObject *fourier_forward(PyObject *module, PyObject *arguments); /* fourier.c */
 PyObject *fourier_backward(PyObject *module, PyObject *arguments); /* fourier.c */
+PyObject *winograd_convolution(PyObject *module, PyObject *arguments); /* winograd.c */
 PyObject *compact_disparity(PyObject *module, PyObject *arguments); /* compact_disparity.c */
 PyObject *compact_warp(PyObject *module, PyObject *arguments); /* compact_warp.c */
 PyObject *compact_blend(PyObject *module, PyObject *arguments); /* compact_blend.c */

@@ -25,38 +25,23 @@ PART Four greater(Four a, Four b) {
 }
 
 /* Comparisons of vectors are -1 where they hold, else 0. */
-PART Sixteen greater_of_sixteen(Sixteen a, Sixteen b) {
-    const SixteenWhole chosen = a > b;
-    return (Sixteen)(((SixteenWhole)a & chosen) | ((SixteenWhole)b & ~chosen));
+PART Eight greater_of_eight(Eight a, Eight b) {
+    const EightWhole chosen = a > b;
+    return (Eight)(((EightWhole)a & chosen) | ((EightWhole)b & ~chosen));
 }
 
-PART Four quarters_greatest(Sixteen values) {
-    Four quarters[4];
-    memcpy(quarters, &values, sizeof quarters);
-    return greater(greater(quarters[0], quarters[1]), greater(quarters[2], quarters[3]));
-}
-
-PART Four sum_of_quarters(Sixteen values) {
-    Four quarters[4];
-    memcpy(quarters, &values, sizeof quarters);
-    return (quarters[0] + quarters[1]) + (quarters[2] + quarters[3]);
-}
-
-PART Sixteen four_times(Four four) {
-    const Four quarters[4] = {four, four, four, four};
-    Sixteen sixteen;
-    memcpy(&sixteen, quarters, sizeof sixteen);
-    return sixteen;
-}
+PART Four first_half(Eight v) { return (Four){v[0], v[1], v[2], v[3]}; }
+PART Four second_half(Eight v) { return (Four){v[4], v[5], v[6], v[7]}; }
+PART Eight twice(Four four) { return (Eight){four[0], four[1], four[2], four[3], four[0], four[1], four[2], four[3]}; }
 
 /* e to the x for x <= 0, to a part in 4 million; below -87 and not a number as at -87. */
-PART Sixteen exponential(Sixteen x) {
-    const Sixteen zero = {0.0f}, bounded = greater_of_sixteen(x, zero - 87.0f);
-    const SixteenWhole power = __builtin_convertvector(bounded * 1.44269504f - 0.5f, SixteenWhole);
-    const Sixteen whole = __builtin_convertvector(power, Sixteen);
-    const Sixteen r = (bounded - whole * 0.693359375f) + whole * 2.12194440e-4f; /* less ln 2 so many times, in two parts */
-    const Sixteen high = r * (1.0f / 24 + r * (1.0f / 120 + r * (1.0f / 720)));
-    return (1.0f + r * (1.0f + r * (0.5f + r * (1.0f / 6 + high)))) * (Sixteen)((power + 127) << 23);
+PART Eight exponential(Eight x) {
+    const Eight zero = {0.0f}, bounded = greater_of_eight(x, zero - 87.0f);
+    const EightWhole power = __builtin_convertvector(bounded * 1.44269504f - 0.5f, EightWhole);
+    const Eight whole = __builtin_convertvector(power, Eight);
+    const Eight r = (bounded - whole * 0.693359375f) + whole * 2.12194440e-4f; /* less ln 2 so many times, in two parts */
+    const Eight high = r * (1.0f / 24 + r * (1.0f / 120 + r * (1.0f / 720)));
+    return (1.0f + r * (1.0f + r * (0.5f + r * (1.0f / 6 + high)))) * (Eight)((power + 127) << 23);
 }
 
 #endif

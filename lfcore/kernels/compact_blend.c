@@ -19,22 +19,25 @@ PART float stored(float toned, float toe) {
     return positive < 1.0f ? positive : 1.0f;
 }
 
-PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const Sixteen nearness) {
+PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const float *nearness) {
     const Py_ssize_t pixel = y * b->width + x;
     float scores[INPUTS * PHASES], residual[3 * PHASES + 1], straight[3 * PHASES + 1]; /* three channels are read as four */
     as_floats(b->logits, pixel * INPUTS * PHASES, INPUTS * PHASES, b->halved, scores);
     as_floats(b->residual, pixel * 3 * PHASES, 3 * PHASES, b->halved, residual);
     as_floats(b->straight, pixel * 3 * PHASES, 3 * PHASES, b->halved, straight);
     residual[3 * PHASES] = straight[3 * PHASES] = 0.0f;
-    const Sixteen sums = sixteen_at(scores) + nearness;
-    const Sixteen shares = exponential(sums - four_times(quarters_greatest(sums)));
-    const Four whole = sum_of_quarters(shares);
+    const Eight low = eight_at(scores) + eight_at(nearness), high = eight_at(scores + 8) + eight_at(nearness + 8);
+    const Eight best = greater_of_eight(low, high);
+    const Four greatest = greater(first_half(best), second_half(best));
+    const Eight shares[2] = {exponential(low - twice(greatest)), exponential(high - twice(greatest))}, sums = shares[0] + shares[1];
+    const Four whole = first_half(sums) + second_half(sums);
+    memcpy(scores, shares, sizeof shares);
     for (int phase = 0; phase < PHASES; ++phase) {
         const Py_ssize_t row = 2 * y + phase / 2, column = 2 * x + phase % 2;
         if (row >= b->picture_height || column >= b->picture_width) continue;
         const float *warped = b->warped + (pixel * PHASES + phase) * INPUTS * 4;
         Four sum = {0.0f};
-        for (int n = 0; n < INPUTS; ++n) sum += shares[PHASES * n + phase] * four_at(warped + 4 * n);
+        for (int n = 0; n < INPUTS; ++n) sum += scores[PHASES * n + phase] * four_at(warped + 4 * n);
         const Four added = four_at(residual + 3 * phase) + four_at(straight + 3 * phase);
         const Four toned = sum / whole[phase] + b->middle + b->weight * added;
         float *out = b->picture + (row * b->picture_width + column) * 3;
@@ -44,9 +47,8 @@ PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const Sixteen 
 
 MANY_PROCESSORS
 static void blend_rows(const Blend *b, Py_ssize_t begin, Py_ssize_t end) {
-    float scores[INPUTS * PHASES];
-    for (int i = 0; i < INPUTS * PHASES; ++i) scores[i] = b->nearness[i / PHASES];
-    const Sixteen nearness = sixteen_at(scores);
+    float nearness[INPUTS * PHASES];
+    for (int i = 0; i < INPUTS * PHASES; ++i) nearness[i] = b->nearness[i / PHASES];
     for (Py_ssize_t y = begin; y < end; ++y)
         for (Py_ssize_t x = 0; x < b->width; ++x) blend_pixel(b, y, x, nearness);
 }

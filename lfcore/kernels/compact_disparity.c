@@ -5,28 +5,31 @@
 #define SPREAD 48 /* four weights for each neighbour, filled up to whole registers */
 #define BOX 2 /* how far the deviation around a pixel reaches */
 
-PART float greatest_of(Sixteen values) {
-    const Four four = quarters_greatest(values);
-    const float low = four[0] > four[1] ? four[0] : four[1], high = four[2] > four[3] ? four[2] : four[3];
-    return low > high ? low : high;
+PART float greatest_of(Eight values) {
+    float greatest = values[0];
+    for (int i = 1; i < 8; ++i) greatest = values[i] > greatest ? values[i] : greatest;
+    return greatest;
 }
 
-PART float sum_of(Sixteen values) {
-    const Four four = sum_of_quarters(values);
-    return (four[0] + four[1]) + (four[2] + four[3]);
-}
+PART float sum_of(Eight v) { return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7])); }
 
 /* Products of four pixels' channels with the columns of a matrix (channels, outputs), outputs a multiple of 16: (4, outputs). */
 PART void four_products(const float *const pixels[4], Py_ssize_t channels, const float *matrix, const float *bias,
                         Py_ssize_t outputs, float *restrict out) {
     for (Py_ssize_t first = 0; first < outputs; first += 16) {
-        Sixteen sums[4];
-        for (int i = 0; i < 4; ++i) sums[i] = sixteen_at(bias + first);
+        Eight low[4], high[4];
+        for (int i = 0; i < 4; ++i) low[i] = eight_at(bias + first), high[i] = eight_at(bias + first + 8);
         for (Py_ssize_t c = 0; c < channels; ++c) {
-            const Sixteen weights = sixteen_at(matrix + c * outputs + first);
-            for (int i = 0; i < 4; ++i) sums[i] += weights * pixels[i][c];
+            const Eight of_low = eight_at(matrix + c * outputs + first), of_high = eight_at(matrix + c * outputs + first + 8);
+            for (int i = 0; i < 4; ++i) {
+                low[i] += of_low * pixels[i][c];
+                high[i] += of_high * pixels[i][c];
+            }
         }
-        for (int i = 0; i < 4; ++i) memcpy(out + i * outputs + first, &sums[i], sizeof sums[i]);
+        for (int i = 0; i < 4; ++i) {
+            memcpy(out + i * outputs + first, &low[i], sizeof low[i]);
+            memcpy(out + i * outputs + first + 8, &high[i], sizeof high[i]);
+        }
     }
 }
 
@@ -56,13 +59,13 @@ PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict row, float 
 }
 
 PART float expected(const float *scores, const float *values, Py_ssize_t outputs) {
-    Sixteen best = sixteen_at(scores), whole = {0.0f}, sum = {0.0f};
-    for (Py_ssize_t i = 16; i < outputs; i += 16) best = greater_of_sixteen(best, sixteen_at(scores + i));
+    Eight best = eight_at(scores), whole = {0.0f}, sum = {0.0f};
+    for (Py_ssize_t i = 8; i < outputs; i += 8) best = greater_of_eight(best, eight_at(scores + i));
     const float greatest = greatest_of(best);
-    for (Py_ssize_t i = 0; i < outputs; i += 16) {
-        const Sixteen shares = exponential(sixteen_at(scores + i) - greatest);
+    for (Py_ssize_t i = 0; i < outputs; i += 8) {
+        const Eight shares = exponential(eight_at(scores + i) - greatest);
         whole += shares;
-        sum += shares * sixteen_at(values + i);
+        sum += shares * eight_at(values + i);
     }
     return sum_of(sum) / sum_of(whole);
 }
@@ -94,8 +97,8 @@ PART void coarse_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, f
 PART Four spread_out(const Disparity *d, Py_ssize_t y, Py_ssize_t x, float *restrict scores) {
     Four best = four_at(scores), whole = {0.0f}, sum = {0.0f};
     for (int k = 1; k < NEIGHBOURS; ++k) best = greater(best, four_at(scores + 4 * k));
-    for (int i = 0; i < SPREAD; i += 16) {
-        const Sixteen shares = exponential(sixteen_at(scores + i) - four_times(best));
+    for (int i = 0; i < SPREAD; i += 8) {
+        const Eight shares = exponential(eight_at(scores + i) - twice(best));
         memcpy(scores + i, &shares, sizeof shares);
     }
     for (int k = 0; k < NEIGHBOURS; ++k) {

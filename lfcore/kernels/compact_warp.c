@@ -35,10 +35,13 @@ PART Four sample_colours(const float *corner, Py_ssize_t height, Py_ssize_t widt
     const Py_ssize_t whole_x = (int32_t)near_x, whole_y = (int32_t)near_y;
     const Four across = cubic_taps(near_x - (float)whole_x, a), down = cubic_taps(near_y - (float)whole_y, a);
     const float *place = corner + 4 * ((whole_y - 1) * width + whole_x - 1);
-    const Sixteen sum = down[0] * sixteen_at(place) + down[1] * sixteen_at(place + 4 * width) +
-                        down[2] * sixteen_at(place + 8 * width) + down[3] * sixteen_at(place + 12 * width);
     Four columns[4];
-    memcpy(columns, &sum, sizeof columns);
+    for (int half = 0; half < 2; ++half) {
+        const float *two = place + 8 * half;
+        const Eight sum = down[0] * eight_at(two) + down[1] * eight_at(two + 4 * width) + down[2] * eight_at(two + 8 * width) +
+                          down[3] * eight_at(two + 12 * width);
+        memcpy(columns + 2 * half, &sum, sizeof sum);
+    }
     return across[0] * columns[0] + across[1] * columns[1] + across[2] * columns[2] + across[3] * columns[3];
 }
 

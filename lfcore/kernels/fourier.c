@@ -1,10 +1,10 @@
 /* Fourier transforms of tiles of 16 x 16 pixels, and back, for lfcore.fourier, which multiplies between them.
  *
- * Sixteen channels lie in the lanes of a register, so that the transforms are plain arithmetic on registers. The last sixteen
- * overlap those before them where the number of channels is not a multiple.
+ * Sixteen channels lie in the lanes of a register, so that the transforms are plain arithmetic on registers.
  */
 #include "tiled.h"
 
+#define LANES 16
 #define SIZE 16 /* of a tile, px */
 
 /* Of the angles 2 pi n / 16. */
@@ -85,31 +85,62 @@ PART void real_sixteen(Sixteen *x) {
 #define LAST_EDGE (FIRST_EDGE + 8)
 
 typedef struct {
-    Tiling picture;
-    void *spectra; /* (129, tiles, 2 channels): real, then imaginary parts, of the picture's type */
+    Tiling tiling; /* of the result */
+    void *pixels; /* (height, width, channels): what is convolved, or the result, which is rectified */
+    int halved; /* whether pixels and spectra are bfloat16; else float32 */
+    Py_ssize_t height, width, channels;
+    void *spectra; /* (129, tiles, 2 channels): real, then imaginary parts */
     float *sums; /* (tiles, channels): frequency 0, which is large, and in bfloat16 would lose most */
-    Py_ssize_t first, tiles; /* of the tiles of the picture */
     const float *bias; /* (channels); backward only */
+    Py_ssize_t first, tiles; /* of the tiles */
 } Fourier;
 
+typedef uint32_t SixteenBits __attribute__((vector_size(4 * LANES)));
+typedef uint16_t SixteenHalves __attribute__((vector_size(2 * LANES)));
+
+PART Sixteen read_sixteen(const void *values, Py_ssize_t place, int halved) {
+    if (!halved) return sixteen_at((const float *)values + place);
+    SixteenHalves halves;
+    memcpy(&halves, (const uint16_t *)values + place, sizeof halves);
+    return (Sixteen)(__builtin_convertvector(halves, SixteenBits) << 16);
+}
+
+PART void write_sixteen(Sixteen values, void *out, Py_ssize_t place, int halved) {
+    if (halved) {
+        const SixteenBits bits = (SixteenBits)values;
+        const SixteenHalves halves = __builtin_convertvector((bits + 0x7FFFu + ((bits >> 16) & 1u)) >> 16, SixteenHalves);
+        memcpy((uint16_t *)out + place, &halves, sizeof halves);
+    } else {
+        memcpy((float *)out + place, &values, sizeof values);
+    }
+}
+
+/* Row y of a tile: zeros beyond the picture. */
+PART void read_row(const Fourier *f, Place at, int y, Py_ssize_t channel, Sixteen *out) {
+    const Py_ssize_t row = at.top + y, place = (row * f->width + at.left) * f->channels + channel;
+    const Py_ssize_t columns = row < f->height ? at_most(SIZE, f->width - at.left) : 0;
+    for (Py_ssize_t x = 0; x < columns; ++x) out[x] = read_sixteen(f->pixels, place + x * f->channels, f->halved);
+    for (Py_ssize_t x = columns; x < SIZE; ++x) out[x] = (Sixteen){0.0f};
+}
+
 PART Py_ssize_t spectrum_place(const Fourier *f, Py_ssize_t frequency, Py_ssize_t tile) {
-    return (frequency * f->tiles + tile) * 2 * f->picture.channels;
+    return (frequency * f->tiles + tile) * 2 * f->channels;
 }
 
 PART void put(const Fourier *f, Py_ssize_t place, Sixteen re, Sixteen im) {
-    write_sixteen(re, f->spectra, place, f->picture.halved);
-    write_sixteen(im, f->spectra, place + f->picture.channels, f->picture.halved);
+    write_sixteen(re, f->spectra, place, f->halved);
+    write_sixteen(im, f->spectra, place + f->channels, f->halved);
 }
 
 PART Sixteen spectrum_at(const Fourier *f, Py_ssize_t place) {
-    return f->picture.halved ? from_halves((const uint16_t *)f->spectra + place) : sixteen_at((const float *)f->spectra + place);
+    return read_sixteen(f->spectra, place, f->halved);
 }
 
 PART void forward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssize_t channel) {
     Sixteen work[SIZE][SIZE], re[SIZE], im[SIZE];
     const Sixteen none = {0.0f};
     for (int y = 0; y < SIZE; ++y) {
-        read_row(&f->picture, at.top + y, at.left, channel, SIZE, work[y]);
+        read_row(f, at, y, channel, work[y]);
         sixteen_real(work[y]);
     }
     const Py_ssize_t next = spectrum_place(f, 1, 0), own = spectrum_place(f, 0, tile) + channel;
@@ -121,7 +152,7 @@ PART void forward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssize
     for (int y = 0; y < SIZE; ++y) re[y] = work[y][0], im[y] = work[y][1];
     sixteen_real(re);
     sixteen_real(im);
-    memcpy(f->sums + tile * f->picture.channels + channel, &re[0], sizeof re[0]);
+    memcpy(f->sums + tile * f->channels + channel, &re[0], sizeof re[0]);
     put(f, own + (LAST_EDGE + 0) * next, im[0], none);
     put(f, own + (FIRST_EDGE + 7) * next, re[1], none);
     put(f, own + (LAST_EDGE + 8) * next, im[1], none);
@@ -134,51 +165,48 @@ PART void forward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssize
 /* From sums over the channels that were read: their pixels, with the bias, rectified. */
 PART void backward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssize_t channel) {
     Sixteen work[SIZE][SIZE], re[SIZE], im[SIZE];
-    const Tiling *t = &f->picture;
     const Py_ssize_t next = spectrum_place(f, 1, 0), own = spectrum_place(f, 0, tile) + channel;
     for (int k = 1; k < 8; ++k) {
         for (int y = 0; y < SIZE; ++y) {
             const Py_ssize_t place = own + ((k - 1) * SIZE + y) * next;
-            re[y] = spectrum_at(f, place), im[y] = spectrum_at(f, place + t->channels);
+            re[y] = spectrum_at(f, place), im[y] = spectrum_at(f, place + f->channels);
         }
         sixteen_complex(im, re);
         for (int y = 0; y < SIZE; ++y) work[y][2 * k] = re[PLACE(y)], work[y][2 * k + 1] = im[PLACE(y)];
     }
-    re[0] = sixteen_at(f->sums + tile * t->channels + channel), im[0] = spectrum_at(f, own + LAST_EDGE * next);
+    re[0] = sixteen_at(f->sums + tile * f->channels + channel), im[0] = spectrum_at(f, own + LAST_EDGE * next);
     re[1] = spectrum_at(f, own + (FIRST_EDGE + 7) * next), im[1] = spectrum_at(f, own + (LAST_EDGE + 8) * next);
     for (int k = 1; k < 8; ++k) {
         const Py_ssize_t first = own + (FIRST_EDGE + k - 1) * next, last = own + (LAST_EDGE + k) * next;
-        re[2 * k] = spectrum_at(f, first), re[2 * k + 1] = spectrum_at(f, first + t->channels);
-        im[2 * k] = spectrum_at(f, last), im[2 * k + 1] = spectrum_at(f, last + t->channels);
+        re[2 * k] = spectrum_at(f, first), re[2 * k + 1] = spectrum_at(f, first + f->channels);
+        im[2 * k] = spectrum_at(f, last), im[2 * k + 1] = spectrum_at(f, last + f->channels);
     }
     real_sixteen(re);
     real_sixteen(im);
     for (int y = 0; y < SIZE; ++y) work[y][0] = re[y], work[y][1] = im[y];
     const Sixteen bias = sixteen_at(f->bias + channel), none = {0.0f};
-    const Py_ssize_t rows = at_most(t->step, t->height - at.top), columns = at_most(t->step, t->width - at.left);
+    const Py_ssize_t rows = pixels_within(&f->tiling, at.top, f->height);
+    const Py_ssize_t columns = pixels_within(&f->tiling, at.left, f->width);
     for (Py_ssize_t y = 0; y < rows; ++y) {
         real_sixteen(work[y]);
         for (Py_ssize_t x = 0; x < columns; ++x) {
-            const Sixteen value = work[y][x] + bias;
-            const Py_ssize_t pixel = (at.top + y) * t->width + at.left + x;
-            write_sixteen((Sixteen)((SixteenBits)value & (SixteenBits)(value > none)), t->pixels, pixel * t->channels + channel,
-                          t->halved);
+            const Py_ssize_t pixel = (at.top + y) * f->width + at.left + x;
+            const Sixteen value = work[y][x] + bias, positive = (Sixteen)((SixteenBits)value & (SixteenBits)(value > none));
+            write_sixteen(positive, f->pixels, pixel * f->channels + channel, f->halved);
         }
     }
 }
 
 MANY_PROCESSORS
 static void forward(const Fourier *f, Py_ssize_t tile) {
-    const Place at = tile_place(&f->picture, f->first + tile);
-    const Py_ssize_t last = f->picture.channels - 16;
-    for (Py_ssize_t channel = 0; channel < last + 16; channel += 16) forward_channels(f, tile, at, at_most(channel, last));
+    const Place at = tile_place(&f->tiling, f->first + tile);
+    EACH_GROUP(channel, f->channels, LANES) forward_channels(f, tile, at, channel);
 }
 
 MANY_PROCESSORS
 static void backward(const Fourier *f, Py_ssize_t tile) {
-    const Place at = tile_place(&f->picture, f->first + tile);
-    const Py_ssize_t last = f->picture.channels - 16;
-    for (Py_ssize_t channel = 0; channel < last + 16; channel += 16) backward_channels(f, tile, at, at_most(channel, last));
+    const Place at = tile_place(&f->tiling, f->first + tile);
+    EACH_GROUP(channel, f->channels, LANES) backward_channels(f, tile, at, channel);
 }
 
 static void all_tiles(const Fourier *f, void (*step)(const Fourier *, Py_ssize_t), int threads) {
@@ -188,14 +216,13 @@ static void all_tiles(const Fourier *f, void (*step)(const Fourier *, Py_ssize_t
 
 /* Arguments of both, and the step itself. */
 static PyObject *transform(PyObject *arguments, void (*step)(const Fourier *, Py_ssize_t)) {
-    Fourier f;
-    Tiling *t = &f.picture;
+    Fourier f = {.tiling = {.dilation = 1}};
     unsigned long long pixels, spectra, sums, bias;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKnnnnnnnnpi", &pixels, &spectra, &sums, &bias, &t->height, &t->width, &t->channels,
-                          &t->result_height, &t->result_width, &t->step, &f.first, &f.tiles, &t->halved, &threads))
+    if (!PyArg_ParseTuple(arguments, "KKKKnnnnnnnnpi", &pixels, &spectra, &sums, &bias, &f.height, &f.width, &f.channels,
+                          &f.tiling.height, &f.tiling.width, &f.tiling.step, &f.first, &f.tiles, &f.halved, &threads))
         return NULL;
-    t->pixels = at_address(pixels);
+    f.pixels = at_address(pixels);
     f.spectra = at_address(spectra);
     f.sums = at_address(sums);
     f.bias = at_address(bias);

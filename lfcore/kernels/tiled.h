@@ -1,57 +1,45 @@
-/* Convolutions that are computed tile by tile after a transform: where tiles lie, how pixels are read and written. */
+/* Convolutions that are computed tile by tile between a transform and its inverse: where tiles lie. */
 #ifndef LFCORE_KERNELS_TILED_H
 #define LFCORE_KERNELS_TILED_H
 
 #include "common.h"
 
-/* A picture, and how tiles cover the result of a convolution of it. */
+/* The result of a convolution, and the tiles that cover it. */
 typedef struct {
-    void *pixels; /* (height, width, channels): of what is read, or of the result */
-    int halved; /* whether it is bfloat16; else float32 */
-    Py_ssize_t height, width, channels;
-    Py_ssize_t result_height, result_width; /* which the tiles cover */
-    Py_ssize_t step; /* pixels of the result that a tile gives along each axis */
+    Py_ssize_t height, width;
+    Py_ssize_t step; /* pixels that a tile gives along each axis, `dilation` apart */
+    Py_ssize_t dilation;
 } Tiling;
 
 typedef struct {
     Py_ssize_t top, left;
 } Place;
 
-/* Where a tile begins: row by row. */
+PART Py_ssize_t tiles_along(Py_ssize_t size, const Tiling *t) {
+    const Py_ssize_t of_a_phase = (size + t->dilation - 1) / t->dilation;
+    return (of_a_phase + t->step - 1) / t->step;
+}
+
+PART Py_ssize_t tile_count(const Tiling *t) {
+    return t->dilation * t->dilation * tiles_along(t->height, t) * tiles_along(t->width, t);
+}
+
+/* Where a tile begins. Pixels `dilation` apart belong together: the tiles of one phase come after those of another. */
 PART Place tile_place(const Tiling *t, Py_ssize_t tile) {
-    const Py_ssize_t columns = (t->result_width + t->step - 1) / t->step;
-    return (Place){tile / columns * t->step, tile % columns * t->step};
+    const Py_ssize_t d = t->dilation, columns = tiles_along(t->width, t);
+    const Py_ssize_t of_a_phase = tiles_along(t->height, t) * columns, phase = tile / of_a_phase, own = tile % of_a_phase;
+    return (Place){phase / d + own / columns * t->step * d, phase % d + own % columns * t->step * d};
 }
 
-typedef uint32_t SixteenBits __attribute__((vector_size(64)));
-typedef uint16_t SixteenHalves __attribute__((vector_size(32)));
-
-PART Sixteen from_halves(const uint16_t *values) {
-    SixteenHalves halves;
-    memcpy(&halves, values, sizeof halves);
-    return (Sixteen)(__builtin_convertvector(halves, SixteenBits) << 16);
+/* How many pixels of a tile that begins at `place` lie in the result along an axis. */
+PART Py_ssize_t pixels_within(const Tiling *t, Py_ssize_t place, Py_ssize_t size) {
+    return at_least(at_most(t->step, (size - place + t->dilation - 1) / t->dilation), 0);
 }
 
-PART void write_sixteen(Sixteen values, void *out, Py_ssize_t place, int halved) {
-    if (halved) {
-        const SixteenBits bits = (SixteenBits)values;
-        const SixteenHalves halves = __builtin_convertvector((bits + 0x7FFFu + ((bits >> 16) & 1u)) >> 16, SixteenHalves);
-        memcpy((uint16_t *)out + place, &halves, sizeof halves);
-    } else {
-        memcpy((float *)out + place, &values, sizeof values);
-    }
-}
-
-/* `SIZE` neighbours in a row of a tile, sixteen channels from `channel` on: zeros beyond the picture. */
-PART void read_row(const Tiling *t, Py_ssize_t row, Py_ssize_t left, Py_ssize_t channel, int size, Sixteen *out) {
-    const Sixteen none = {0.0f};
-    for (int i = 0; i < size; ++i) {
-        const Py_ssize_t column = left + i, place = (row * t->width + column) * t->channels + channel;
-        if (row < 0 || row >= t->height || column < 0 || column >= t->width)
-            out[i] = none;
-        else
-            out[i] = t->halved ? from_halves((const uint16_t *)t->pixels + place) : sixteen_at((const float *)t->pixels + place);
-    }
-}
+/* Each `count` channels, as many as lie in a register: `channel` is the first of them. The last ones overlap those before them
+ * where the number of channels is not a multiple. */
+#define EACH_GROUP(channel, channels, count)                                                                                   \
+    for (Py_ssize_t group_ = 0, channel = 0; group_ < (channels) && (channel = at_most(group_, (channels) - (count)), 1);      \
+         group_ += (count))
 
 #endif

@@ -1,0 +1,47 @@
+"""Convolutions of the small pair as they are computed for synthesis, with what comes directly before and after them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from lfcore.kernels import compiled
+from lfcore.winograd import LEAST_CHANNELS, WinogradConvolution
+
+# With fewer channels out, the transforms cost as much as they save.
+_LEAST_WORTH = 32
+
+
+class Layer(Protocol):
+    """A convolution. Pictures are (1, channels, height, width), channels_last."""
+
+    def __call__(self, x: Tensor, *, of_positive: bool = False, plus: Tensor | None = None, positive: bool = False) -> Tensor:
+        """The convolution of x, or of ReLU(x) where `of_positive`; `plus` added; then ReLU where `positive`. A new tensor."""
+
+
+class DirectConvolution:
+    """By torch, in the type of its weights."""
+
+    def __init__(self, weight: Tensor, bias: Tensor | None, stride: int = 1, padding: int = 0, dilation: int = 1) -> None:
+        self._weight = weight.contiguous(memory_format=torch.channels_last)
+        self._bias = bias
+        self._stride, self._padding, self._dilation = stride, padding, dilation
+
+    def __call__(self, x: Tensor, *, of_positive: bool = False, plus: Tensor | None = None, positive: bool = False) -> Tensor:
+        """See Layer."""
+        y = F.conv2d(x.relu() if of_positive else x, self._weight, self._bias, self._stride, self._padding, self._dilation)
+        if plus is not None:
+            y.add_(plus)
+        return y.relu_() if positive else y
+
+
+def fastest_layer(weight: Tensor, bias: Tensor | None, dtype: torch.dtype, stride: int, padding: int, dilation: int) -> Layer:
+    """How a convolution is computed fastest in a type. weight: (out, in, k, k) float32."""
+    outputs, inputs, kernel, _ = weight.shape
+    winograd = compiled() and dtype == torch.float32 and kernel == 3 and stride == 1
+    if winograd and inputs >= LEAST_CHANNELS and outputs >= _LEAST_WORTH:
+        return WinogradConvolution(weight, bias, padding, dilation)
+    return DirectConvolution(weight.to(dtype), None if bias is None else bias.to(dtype), stride, padding, dilation)
