@@ -71,8 +71,13 @@ class FourierConvolution:
 
 def _spectral_weights(weight: Tensor) -> Tensor:
     """Kernels (O, C, k, k) to matrices (129, 2 C, 2 O) by which a row of real, then imaginary parts is multiplied."""
-    spectrum = torch.fft.rfft2(weight, s=(SIZE, SIZE))[:, :, *_frequencies()].permute(2, 1, 0)  # (129, C, O)
-    real, imaginary = spectrum.real / SIZE**2, -spectrum.imag / SIZE**2  # conjugated: networks correlate
+    rows, columns = _frequencies()
+    along = 2 * math.pi / SIZE * torch.arange(weight.shape[-1], dtype=torch.float64)
+    angles = (rows[:, None, None] * along[:, None] + columns[:, None, None] * along).float()  # (129, k, k)
+    # Conjugated, since networks correlate.
+    real, imaginary = (
+        torch.tensordot(wave / SIZE**2, weight, ((1, 2), (2, 3))).transpose(1, 2) for wave in (angles.cos(), angles.sin())
+    )  # (129, C, O)
     return torch.cat((torch.cat((real, imaginary), 2), torch.cat((-imaginary, real), 2)), 1)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import torch
 import torch.nn.functional as F
@@ -58,27 +59,25 @@ class NetworkSynthesizer:
         corners, luma, levels = self._corners, self._luma, self.config.levels
         _, _, height, width = corners.shape
         offsets = corner_offsets(u, v)
-        clock = Clock()
+        clock, check = Clock(), partial(check_cancelled, cancelled)
         disparity = torch.empty(1, 1, height, width)
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
             for tile in self._tuning.tiles(height, width):
-                check_cancelled(cancelled)
+                check()
                 features = self._disparity.empty_input(*tile.shape)
                 plane_sweep(luma, offsets, levels, tile.source, tile.inner(features)[:, : 2 * levels.count])
                 tile.mirror(features)
                 clock.lap("features")
-                check_cancelled(cancelled)
-                put(disparity, tile.window, self._disparity(features))
+                put(disparity, tile.window, self._disparity(features, check))
                 clock.lap("disparity")
-            check_cancelled(cancelled)
+            check()
             warped = backward_warp(corners, disparity, offsets)  # (4, 3, H, W)
             continued = _continued_at_edges(corners, disparity, offsets, warped).view(1, 12, height, width)
             h = colour_features(disparity, continued, torch.tensor([[u, v]]))  # (1, 15, H, W)
             clock.lap("warp")
             for tile in self._tuning.tiles(height, width):
-                check_cancelled(cancelled)
-                put(image, tile.window, self._colour(self._colour.tile_input(h, tile)))
+                put(image, tile.window, self._colour(self._colour.tile_input(h, tile), check))
             clock.lap("colour")
         return Synthesis(
             u, v, self.name, picture(image[0].clamp_(0, 1)), disparity[0, 0].numpy(), picture(warped), clock.timings()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -39,12 +40,11 @@ class SingleSynthesizer:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
         height, width = self._inputs.shape[2:]
-        clock = Clock()
+        clock, check = Clock(), partial(check_cancelled, cancelled)
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
             features = single_features(self._inputs, torch.tensor([[u, v]]))  # (1, 14, H, W)
             for tile in self._tuning.tiles(height, width):
-                check_cancelled(cancelled)
-                put(image, tile.window, self._stack(self._stack.tile_input(features, tile)))
+                put(image, tile.window, self._stack(self._stack.tile_input(features, tile), check))
             clock.lap("colour")
         return Synthesis(u, v, self.name, picture(image[0].clamp_(0, 1)), None, None, clock.timings())

@@ -90,6 +90,10 @@ def _spans(size: int, most: int) -> list[tuple[int, int]]:
     return list(pairwise([*range(0, size, step), size]))
 
 
+def _unchecked() -> None:
+    pass
+
+
 class TunedStack:
     """A PaperStack for inference: its hidden layers in the tuned type, in channels_last order, their channels filled.
 
@@ -123,9 +127,11 @@ class TunedStack:
         tile.mirror(x)
         return x
 
-    def __call__(self, x: Tensor) -> Tensor:
-        """An input as `empty_input` makes it to (1, outputs, height - 12, width - 12) float32."""
+    def __call__(self, x: Tensor, check: Callable[[], None] = _unchecked) -> Tensor:
+        """An input as `empty_input` makes it to (1, outputs, height - 12, width - 12) float32. `check` is called before
+        each hidden layer; what it raises ends the work."""
         for layer in self._hidden:
+            check()
             x = layer(x)
         result: Tensor = self._last(x[:, : self._outputs].float())
         return result

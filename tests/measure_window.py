@@ -1,8 +1,8 @@
 """What the window costs while a person uses it, on a virtual screen with Mesa's software renderer.
 
 `python -m tests.measure_window LIGHT_FIELD ANOTHER` (folders of views): seconds from start to the first picture and to the
-finished one that lies on disk, then the times of frames while another light field is opened, the cache fills, and a sweep
-is exported.
+finished one that lies on disk, and from the end of a drag to the finished picture; then the times of frames while another
+light field is opened, the cache fills, and a sweep is exported.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from app.opening import SHIPPED
 from tests.virtual_screen import VirtualScreen, virtual_screen, wait_until
 
 STARTS = 4
+RESTS = 12
+UNSEEN = 0.35  # s after a drag in which the screen is left alone
 TOO_LONG = 0.05  # s, of a frame
 PICTURE = (slice(100, 600), slice(100, 800))  # rows and columns of the screen that lie on the picture
 DOT = (784, slice(12, 22))  # of the step in the status line
@@ -66,6 +68,24 @@ def measure_start(screen: VirtualScreen, path: Path, frames: Path) -> None:
             finished = _seconds_until(lambda: _is_full(screen), start)
             print(f"start {number + 1}: first picture after {first:.2f} s, that of full after {finished:.2f} s")
             time.sleep(3)
+
+
+def measure_rest(screen: VirtualScreen, path: Path, frames: Path) -> None:
+    """How long a hand that comes to rest at a viewpoint nobody has seen waits for the picture of `full`, its fade included."""
+    seconds = []
+    with screen.program(PROGRAM, str(path), str(frames)):
+        wait_until(lambda: _is_full(screen), "the picture of full")
+        time.sleep(5)  # the networks may still be on their way
+        screen.xdotool("mousemove", 400, 300, "mousedown", 1)
+        for drag in range(1, RESTS + 1):
+            screen.xdotool("mousemove", 400 + 23 * drag, 300 + 17 * (drag % 5))
+            moved = time.monotonic()
+            time.sleep(UNSEEN)  # looking takes a part of what the networks need
+            assert not _is_full(screen), "the screen was not looked at early enough"
+            seconds.append(_seconds_until(lambda: _is_full(screen), moved))
+            time.sleep(1)
+        screen.xdotool("mouseup", 1)
+    print(f"full after the hand came to rest: {min(seconds):.2f} to {max(seconds):.2f} s, median {np.median(seconds):.2f}")
 
 
 def measure_frames(screen: VirtualScreen, path: Path, another: Path, frames: Path, folder: Path) -> None:
@@ -119,6 +139,7 @@ def main() -> None:
         (folder / "screen").mkdir()
         with virtual_screen(folder / "screen") as screen:
             measure_start(screen, path, folder / "frames")
+            measure_rest(screen, path, folder / "frames")
             measure_frames(screen, path, another, folder / "frames", folder)
 
 

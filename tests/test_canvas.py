@@ -13,10 +13,11 @@ from moving_scene import DISPARITY, SIZE, truth
 
 from app import glsl
 from app.canvas import BACKGROUND, Canvas, Frame, Target
+from app.canvas.passes import Pass
 from app.comparison import Source
 from app.engine import _pixels
 from app.geometry import Rect, Zoom, place
-from app.state import CARRIED, Look
+from app.state import CARRIED, CARRIED_IN_SOFTWARE, Look, Reach
 from app.tone import Curve, Tone
 from lfcore import colormaps
 from lfcore.errors import InputError, LfviewError
@@ -316,17 +317,29 @@ def test_a_picture_made_much_smaller_keeps_its_mean(canvas: Canvas, gl: Any) -> 
     texture.release()
 
 
-def test_warming_up_compiles_what_a_moving_picture_needs_and_leaves_nothing(gl: Any) -> None:
-    canvas = Canvas(gl)
+@pytest.mark.parametrize("reach", [CARRIED, CARRIED_IN_SOFTWARE])
+def test_warming_up_runs_what_a_moving_picture_needs_and_leaves_nothing(
+    gl: Any, reach: Reach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once compiled by OpenGL a shader is compiled by a software rasteriser still, when it is first run."""
+    run: set[Pass] = set()
+    render = Pass.render
+
+    def noted(self: Pass, *arguments: Any) -> None:
+        run.add(self)
+        render(self, *arguments)
+
+    monkeypatch.setattr(Pass, "render", noted)
+    canvas = Canvas(gl, reach=reach)
     canvas.warm_up(Target(gl.simple_framebuffer((8, 8)), (8, 8)))
     assert not canvas.has_light_field
-    compiled = canvas.passes.compiled
+    warm = frozenset(run)
     canvas.set_light_field(random_corners("uint8"))
-    for viewpoint in ((0.5, 0.5), (0.52, 0.5), (0.65, 0.5), (0.9, 0.5)):
-        give(canvas, truth(0.5, 0.5), np.zeros(SIZE, np.float32), (0.5, 0.5))
+    for distance in (0.0, 0.02, 0.15, 0.25, 0.4, 0.6, 1.0):
+        give(canvas, truth(0.5, 0.5), np.zeros(SIZE, np.float32), (0.0, 0.5))
         for share in (0.3, 1.0):
-            canvas.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
-    assert canvas.passes.compiled == compiled
+            canvas.prepare(Frame(Look.SYNTHESIS, (distance, 0.5), share=share))
+    assert run == warm
     canvas.clear()
 
 

@@ -110,11 +110,12 @@ class Canvas:
         size = (3, 5)
         self.set_light_field(np.zeros((4, *size, 3), np.uint8))
         image, pixels, disparity = np.zeros((*size, 3), np.float32), np.zeros((*size, 4), np.uint8), np.zeros(size, np.float32)
-        here, near, far = (0.5, 0.5), (0.5, 0.45), (0.5, 0.1)
+        here, near = (0.0, 0.0), (0.05, 0.0)
+        between, far = ((self._reach.near + self._reach.far) / 2, 0.0), (1.0, 1.0)  # carried in part, and not at all
         self.prepare(Frame(Look.SYNTHESIS, here))
         for share in (0.5, 1.0):  # fading in over nothing, then over the one before
             self.set_synthesis(image, pixels, disparity, here)
-            for viewpoint in (here, near, far):
+            for viewpoint in (here, near, between, far):
                 self.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
         self.prepare(Frame(Look.SYNTHESIS, near, share=0.5))
         for scale in (0.5, 1.0, 2.0):

@@ -52,10 +52,11 @@ PART void four(Eight *x) {
     x[3] = difference + 8.0f * outer + x[5];
 }
 
-/* From one of the places of a tile to the next: an odd number of cache lines, so that they do not all fall on the same places of a
- * cache. */
-PART Py_ssize_t inputs_of_a_place(const Winograd *w) { return TILES * w->channels / 16 * 16 + 16 * (1 + TILES * w->channels / 16 % 2); }
-PART Py_ssize_t products_of_a_place(const Winograd *w) { return TILES * w->groups * COLUMNS + 16; }
+/* Floats from one of the places of a tile to the next, `least` or more: an odd number of cache lines, so that they do not all
+ * fall on the same places of a cache. */
+PART Py_ssize_t spaced(Py_ssize_t least) { return 16 * ((least + 15) / 16 | 1); }
+PART Py_ssize_t inputs_of_a_place(const Winograd *w) { return spaced(TILES * w->channels); }
+PART Py_ssize_t products_of_a_place(const Winograd *w) { return spaced(TILES * w->groups * COLUMNS); }
 
 PART void read_row(const Winograd *w, Place at, int y, Py_ssize_t channel, Eight *out) {
     const Py_ssize_t d = w->tiling.dilation, row = at.top - w->padding + y * d, left = at.left - w->padding;
