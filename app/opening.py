@@ -81,7 +81,7 @@ def preview(path: Path) -> LightField | None:
 DEFAULT_MODEL = "full"
 QUICK = "realtime"
 # lfcore.synthesizer.MODEL_NAMES, without importing torch.
-SHIPPED = ("full", "fine", "realtime", "single", "planesweep", "mean")
+SHIPPED = ("full", "realtime", "single", "planesweep", "mean")
 
 
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
@@ -105,7 +105,7 @@ def make_engine(model: str, cache_bytes: int, process: SynthesisProcess, store: 
 
 def is_slow(model: str) -> bool:
     """Whether the small networks should stand in for a model, named or a weight file, while the hand moves."""
-    return model in ("full", "fine", "single") or model.endswith(".safetensors")
+    return model in ("full", "single") or model.endswith(".safetensors")
 
 
 def offered_models(model: str, process: SynthesisProcess) -> dict[str, ModelChoice]:

@@ -9,7 +9,6 @@ is missing. Both see pictures in the root tone (lfcore.tone), which evens out ex
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import torch
 import torch.nn.functional as F
@@ -35,19 +34,6 @@ class CompactConfig:
     fine_width: int = 48  # its channels at half resolution
     colour_width: int = 48
     colour_blocks: int = 2
-
-
-class SweepSettings(Protocol):
-    """What of a config the disparity network needs; see CompactConfig."""
-
-    @property
-    def levels(self) -> Levels: ...
-    @property
-    def width(self) -> int: ...
-    @property
-    def dilations(self) -> tuple[int, ...]: ...
-    @property
-    def fine_width(self) -> int: ...
 
 
 class CompactModel(nn.Module):
@@ -81,7 +67,7 @@ class CompactDisparity(nn.Module):
 
     values: Tensor
 
-    def __init__(self, config: SweepSettings) -> None:
+    def __init__(self, config: CompactConfig) -> None:
         super().__init__()
         count, width, fine = config.levels.count, config.width, config.fine_width
         self.stem = nn.Conv2d(2 * count, width, 3, stride=2, padding=1)
@@ -95,10 +81,6 @@ class CompactDisparity(nn.Module):
         self.register_buffer("values", config.levels.values(), persistent=False)
 
     def forward(self, features: Tensor) -> Tensor:
-        return self.look(features)[0]
-
-    def look(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """The disparity, and what was made of the features on the way to it: (B, fine_width, h, w), not negative."""
         count = self.values.numel()
         scaled = torch.cat((4 * features[:, :count] - 2, 10 * features[:, count:]), 1)
         coarse = F.relu(self.rise(F.relu(self.blocks(self.stem(scaled)))))
@@ -110,7 +92,7 @@ class CompactDisparity(nn.Module):
             agreement = mean_around(features[:, count:].float(), AGREEMENT_REACH)
             logits = self.score(h) - self.sharpness * agreement
             coarse_disparity = (logits.softmax(1) * self.values.view(1, -1, 1, 1)).sum(1, keepdim=True)
-            return spread_out(coarse_disparity, self.spread(h)), h
+            return spread_out(coarse_disparity, self.spread(h))
 
 
 def spread_out(coarse: Tensor, logits: Tensor) -> Tensor:
@@ -172,15 +154,15 @@ def log_nearness(positions: Tensor) -> Tensor:
 
 def initialise_compact(model: CompactModel, seed: int) -> None:
     """He initialisation; what is added to a path that already works starts small."""
-    initialise_layers(model, seed)
+    _initialise_layers(model, seed)
     with torch.no_grad():
         model.colour.straight.weight.zero_()
         for layer in (model.colour.weights, model.colour.residual):
             layer.weight *= 0.1
-        start_as_sweep(model.disparity)
+        _start_as_sweep(model.disparity)
 
 
-def initialise_layers(model: nn.Module, seed: int) -> None:
+def _initialise_layers(model: nn.Module, seed: int) -> None:
     """He initialisation of all convolutions; residual blocks start small."""
     generator = torch.Generator().manual_seed(seed)
     for module in model.modules():
@@ -194,7 +176,7 @@ def initialise_layers(model: nn.Module, seed: int) -> None:
                 module.second.weight *= 0.3
 
 
-def start_as_sweep(network: CompactDisparity) -> None:
+def _start_as_sweep(network: CompactDisparity) -> None:
     """Begin with little more than the sweep's own minimum; full resolution starts as the coarse pixel itself, mostly."""
     with torch.no_grad():
         network.score.weight *= 0.1

@@ -7,17 +7,15 @@ from dataclasses import fields
 from typing import Any
 
 from lfcore.compact import CompactConfig, CompactModel
-from lfcore.fine import FineConfig, FineModel
 from lfcore.networks import FullModel, ModelConfig, SingleConfig, SingleModel
 from lfcore.planesweep import Levels
 
-Model = FullModel | CompactModel | FineModel | SingleModel
-Config = ModelConfig | CompactConfig | FineConfig | SingleConfig
+Model = FullModel | CompactModel | SingleModel
+Config = ModelConfig | CompactConfig | SingleConfig
 
 _BUILDERS: Mapping[str, tuple[type[Config], Callable[[Any], Model]]] = {
     "full": (ModelConfig, FullModel),
     "realtime": (CompactConfig, CompactModel),
-    "fine": (FineConfig, FineModel),
     "single": (SingleConfig, SingleModel),
 }
 TRAINABLE = tuple(_BUILDERS)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from torch import nn
 
 from lfcore.compact import ALIGNMENT, CompactConfig, CompactModel
-from lfcore.fine import FineConfig, FineModel
 from lfcore.models import Config
 from lfcore.networks import BORDER, FullModel, ModelConfig, PaperStack, SingleConfig, SingleModel
 
@@ -30,22 +29,21 @@ def _stack_operations(stack: PaperStack, size: tuple[int, ...]) -> float:
     return total
 
 
-def _compact_operations(config: CompactConfig | FineConfig, size: tuple[int, ...]) -> dict[str, float]:
-    model = CompactModel(config) if isinstance(config, CompactConfig) else FineModel(config)
+def _compact_operations(config: CompactConfig, size: tuple[int, ...]) -> dict[str, float]:
+    model = CompactModel(config)
     height, width = (-(-extent // ALIGNMENT) * ALIGNMENT for extent in size)
     # All layers keep the size, at half the resolution, but for the stem and what follows it, at a quarter.
     halves, quarters = height * width / 4, height * width / 16
     first = model.disparity
     coarse = {id(layer) for part in (first.stem, first.blocks, first.rise) for layer in part.modules()}
-    networks: list[tuple[str, nn.Module]] = [("disparity", first), ("colour", model.colour)]
-    if isinstance(model, FineModel):
-        networks.append(("disparity", model.surfaces))
-    total = dict.fromkeys((stage for stage, _ in networks), 0.0)
-    for stage, network in networks:
-        for layer in network.modules():
-            if isinstance(layer, nn.Conv2d):
-                total[stage] += _per_pixel(layer) * (quarters if id(layer) in coarse else halves)
-    return total
+    return {
+        stage: sum(
+            _per_pixel(layer) * (quarters if id(layer) in coarse else halves)
+            for layer in network.modules()
+            if isinstance(layer, nn.Conv2d)
+        )
+        for stage, network in (("disparity", first), ("colour", model.colour))
+    }
 
 
 def _per_pixel(layer: nn.Conv2d) -> float:

@@ -15,7 +15,6 @@ import torch
 from torch import Tensor
 
 from lfcore.errors import Cancelled, InputError
-from lfcore.fine import FineModel
 from lfcore.lightfield import CORNERS, FloatArray, LightField, check_viewpoint
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, sweep_luminance
@@ -79,7 +78,7 @@ class MeanSynthesizer:
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
 
 
-MODEL_NAMES = ("full", "fine", "realtime", "single", "planesweep", "mean")
+MODEL_NAMES = ("full", "realtime", "single", "planesweep", "mean")
 
 
 def make_synthesizer(model: str | Path = "full") -> Synthesizer:
@@ -111,7 +110,6 @@ def make_synthesizer(model: str | Path = "full") -> Synthesizer:
 def synthesizer_of(model: Model, key: str) -> Synthesizer:
     """The synthesizer that runs a model; `key` names its weights in caches."""
     from lfcore.compact_synthesizer import CompactSynthesizer
-    from lfcore.fine_synthesizer import FineSynthesizer
     from lfcore.network_synthesizer import NetworkSynthesizer
     from lfcore.single_synthesizer import SingleSynthesizer
 
@@ -119,8 +117,6 @@ def synthesizer_of(model: Model, key: str) -> Synthesizer:
         return NetworkSynthesizer(model, key)
     if isinstance(model, SingleModel):
         return SingleSynthesizer(model, key)
-    if isinstance(model, FineModel):
-        return FineSynthesizer(model, key)
     return CompactSynthesizer(model, key)
 
 

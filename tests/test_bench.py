@@ -16,7 +16,6 @@ from lfcore import bench
 from lfcore.compact import CompactConfig, CompactModel
 from lfcore.errors import OutputError
 from lfcore.export import check_folder, write_picture
-from lfcore.fine import FineConfig, FineModel
 from lfcore.models import Config, build_model
 from lfcore.networks import BORDER, FullModel, ModelConfig, SingleConfig
 from lfcore.operations import network_operations
@@ -42,17 +41,7 @@ def test_a_fresh_process_hands_back_results_and_errors() -> None:
         bench.in_fresh_process(check_folder, Path("nowhere"))
 
 
-class NothingWarped:
-    """A warp (lfcore.fine.Warp) of inputs that are black."""
-
-    def pictures(self, disparity: torch.Tensor) -> torch.Tensor:
-        return torch.zeros_like(disparity).repeat(1, 12, 1, 1)
-
-    def luminances(self, disparity: torch.Tensor) -> list[torch.Tensor]:
-        return [torch.zeros_like(disparity) for _ in range(4)]
-
-
-CONFIGS = [ModelConfig(levels=Levels(8)), SingleConfig(), CompactConfig(levels=Levels(8)), FineConfig(levels=Levels(8))]
+CONFIGS = [ModelConfig(levels=Levels(8)), SingleConfig(), CompactConfig(levels=Levels(8))]
 
 
 @pytest.mark.parametrize("config", CONFIGS)
@@ -64,8 +53,6 @@ def test_operations_are_those_that_torch_counts_in_the_convolutions(config: Conf
         if isinstance(model, CompactModel):
             model.disparity(torch.zeros(1, 16, SIDE // 2, SIDE // 2))
             model.colour(torch.zeros(1, 12, SIDE, SIDE), torch.zeros(1, 1, SIDE, SIDE), torch.zeros(1, 2))
-        elif isinstance(model, FineModel):
-            model(torch.zeros(1, 16, SIDE // 2, SIDE // 2), NothingWarped(), torch.zeros(1, 2))
         elif isinstance(model, FullModel):
             model.disparity(torch.zeros(1, 16, wide, wide))
             model.colour(torch.zeros(1, 15, wide, wide))

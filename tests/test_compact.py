@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,33 +8,17 @@ from scenes import plane
 from lfcore.compact import CompactModel, initialise_compact, log_nearness, spread_out
 from lfcore.compact_synthesizer import CompactSynthesizer
 from lfcore.errors import Cancelled, InputError
-from lfcore.fine import FineModel, initialise_fine
-from lfcore.fine_synthesizer import FineSynthesizer
 from lfcore.lightfield import CORNERS, LightField
 from lfcore.metrics import psnr
 from lfcore.synthesis import Synthesizer
 from lfcore.tone import root_tone, stored_from_root
 
-Made = Callable[[torch.dtype | None], Synthesizer]
 
-
-def compact(dtype: torch.dtype | None) -> Synthesizer:
+def untrained(dtype: torch.dtype | None) -> Synthesizer:
+    """The small pair with the weights from which training starts."""
     model = CompactModel()
     initialise_compact(model, 1)
     return CompactSynthesizer(model, "test", dtype)
-
-
-def fine(dtype: torch.dtype | None) -> Synthesizer:
-    model = FineModel()
-    initialise_fine(model, 1)
-    return FineSynthesizer(model, "test", dtype)
-
-
-@pytest.fixture(params=[compact, fine])
-def untrained(request: pytest.FixtureRequest) -> Made:
-    """Both pairs whose sweep is that of half resolution, with the weights from which training starts."""
-    made: Made = request.param
-    return made
 
 
 def test_the_root_tone_has_its_inverse_and_evens_out_shot_noise() -> None:
@@ -68,7 +51,7 @@ def test_nearness_is_in_the_order_of_the_corners() -> None:
 
 
 @pytest.mark.parametrize("disparity", [-9.0, 0.0, 6.0])
-def test_untrained_it_starts_from_the_minimum_of_the_sweep(untrained: Made, disparity: float) -> None:
+def test_untrained_it_starts_from_the_minimum_of_the_sweep(disparity: float) -> None:
     """Its first guess for a textured plane at a known disparity is near that, and so the picture is near the truth."""
     field = plane(disparity, (3, 3), (72, 92))
     synthesizer = untrained(torch.float32)
@@ -83,7 +66,7 @@ def test_untrained_it_starts_from_the_minimum_of_the_sweep(untrained: Made, disp
     assert psnr(found.image[inside, inside], truth) > psnr(field.corners().mean(0)[inside, inside], truth) or disparity == 0
 
 
-def test_pictures_of_any_size_come_out_whole_and_like_a_larger_ones_part(untrained: Made) -> None:
+def test_pictures_of_any_size_come_out_whole_and_like_a_larger_ones_part() -> None:
     field = plane(2.0, (2, 2), (61, 83))
     synthesizer = untrained(torch.float32)
     synthesizer.set_light_field(field)
@@ -95,7 +78,7 @@ def test_pictures_of_any_size_come_out_whole_and_like_a_larger_ones_part(untrain
     assert set(found.timings) == {"features", "disparity", "warp", "colour", "total"}
 
 
-def test_bfloat16_changes_little(untrained: Made) -> None:
+def test_bfloat16_changes_little() -> None:
     field = plane(3.0, (2, 2), (64, 80))
     pictures = []
     for dtype in (torch.float32, torch.bfloat16):
@@ -105,7 +88,7 @@ def test_bfloat16_changes_little(untrained: Made) -> None:
     assert psnr(pictures[0], pictures[1]) > 40
 
 
-def test_the_synthesizer_asks_for_what_it_needs(untrained: Made) -> None:
+def test_the_synthesizer_asks_for_what_it_needs() -> None:
     synthesizer = untrained(None)
     with pytest.raises(InputError, match="set_light_field"):
         synthesizer.synthesize(0.5, 0.5)

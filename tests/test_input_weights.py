@@ -22,8 +22,6 @@ from app.state import Look
 from lfcore.cache import CacheKey, SynthesisCache
 from lfcore.compact import CompactConfig, CompactModel, initialise_compact
 from lfcore.compact_synthesizer import CompactSynthesizer
-from lfcore.fine import SURFACES, FineConfig, FineModel, Surfaces, initialise_fine
-from lfcore.fine_synthesizer import FineSynthesizer
 from lfcore.lightfield import FloatArray
 from lfcore.planesweep import Levels
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
@@ -35,22 +33,11 @@ SIZE = (21, 34)  # odd, so that the networks' phases do not fit
 VIEWPOINT = (0.25, 0.5)
 
 
-def compact_model() -> CompactModel:
+@pytest.fixture(scope="module")
+def summing() -> WeighingSynthesizer:
+    """Networks with random weights whose picture is the weighted sum alone: what they add to it is zero."""
     model = CompactModel(CompactConfig(levels=Levels(12, -9, 9)))
     initialise_compact(model, 5)
-    return model
-
-
-def fine_model() -> FineModel:
-    model = FineModel(FineConfig(levels=Levels(12, -9, 9)))
-    initialise_fine(model, 5)
-    return model
-
-
-@pytest.fixture(scope="module", params=[compact_model, fine_model])
-def summing(request: pytest.FixtureRequest) -> WeighingSynthesizer:
-    """Networks with random weights whose picture is the weighted sum alone: what they add to it is zero."""
-    model: CompactModel | FineModel = request.param()
     generator = torch.Generator().manual_seed(6)
     with torch.no_grad():
         for parameter in model.parameters():
@@ -59,22 +46,9 @@ def summing(request: pytest.FixtureRequest) -> WeighingSynthesizer:
         for layer in (model.colour.straight, model.colour.residual):
             for parameter in layer.parameters():
                 parameter.zero_()
-    synthesizer: WeighingSynthesizer
-    if isinstance(model, FineModel):
-        one_surface(model.surfaces)
-        synthesizer = FineSynthesizer(model.eval(), "key", torch.float32)
-    else:
-        synthesizer = CompactSynthesizer(model.eval(), "key", torch.float32)
+    synthesizer = CompactSynthesizer(model.eval(), "key", torch.float32)
     synthesizer.set_light_field(light_field(2, 2, SIZE))
     return synthesizer
-
-
-def one_surface(surfaces: Surfaces) -> None:
-    """Both disparities of a pixel are its own, so that an input's two warped pictures are one."""
-    with torch.no_grad():
-        surfaces.choice.weight.zero_()
-        assert surfaces.choice.bias is not None
-        surfaces.choice.bias.zero_().view(SURFACES, -1, 4)[:, 0] = 50.0
 
 
 def test_the_picture_is_the_sum_of_the_warped_inputs_by_these_weights(summing: WeighingSynthesizer) -> None:

@@ -19,7 +19,7 @@ from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
 
 BUTTERCUP = Path(__file__).parents[2] / "shared" / "data" / "val" / "Buttercup"
-SHIPPED = ("full", "fine", "realtime", "single")
+SHIPPED = ("full", "realtime", "single")
 SCENES = [
     sample_path(),
     pytest.param(
@@ -64,20 +64,11 @@ def test_bfloat16_costs_no_more_than_a_twentieth_of_a_decibel_and_both_beat_the_
 
 
 @pytest.mark.parametrize("path", SCENES)
-def test_the_small_pair_is_far_above_the_mean_and_not_below_the_papers(path: Path) -> None:
-    field = open_light_field(path)
-    small, mean, full = (score(make_synthesizer(name), field) for name in ("realtime", "mean", "full"))
-    assert small > mean + 3
-    assert small > full - 0.5
-
-
-@pytest.mark.parametrize("path", SCENES)
-def test_the_larger_pair_is_above_all_but_the_small_one_and_not_below_that(path: Path) -> None:
+def test_the_small_pair_is_above_all_others_and_the_papers_pair_is_second(path: Path) -> None:
     field = open_light_field(path)
     scores = {name: score(make_synthesizer(name), field) for name in MODEL_NAMES}
-    small = scores.pop("realtime")
-    assert max(scores, key=lambda name: scores[name]) == "fine"
-    assert scores["fine"] > small - 0.1
+    assert sorted(scores, key=lambda name: -scores[name])[:2] == ["realtime", "full"]
+    assert scores["full"] > max(scores["single"], scores["mean"]) + 1.5
 
 
 @pytest.mark.skipif(not BUTTERCUP.is_dir(), reason="the shared test data is not beside the repository")

@@ -13,13 +13,12 @@ from lfcore.compact import CompactModel
 from lfcore.compact_synthesizer import CompactSynthesizer
 from lfcore.errors import InputError
 from lfcore.export import write_picture
-from lfcore.fine import FineModel
 from lfcore.lightfield import CORNERS, LightField
 from lfcore.models import TRAINABLE
 from lfcore.networks import BORDER, FullModel, initialise
 from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
-from lfcore.training.architectures import Batch, Prediction, architecture, begin_from
+from lfcore.training.architectures import Batch, Prediction, architecture
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, learning_rate, prepare_scene, train
 from lfcore.training.loss import LossConfig, StepLoss, cut
@@ -143,13 +142,12 @@ def test_a_shifted_sweep_shows_disparities_that_are_so_much_higher(shift: float)
     assert float(loss) < 0.3  # the best match is where the network says
 
 
-@pytest.mark.parametrize("name", ["realtime", "fine"])
-def test_the_other_pairs_sweep_and_warp_with_the_shift_too(name: str) -> None:
-    """Their answer to a shifted group is that to the same group without a shift, if the levels are those of the shift."""
+def test_the_small_pair_sweeps_and_warps_with_the_shift_too() -> None:
+    """Its answer to a shifted group is that to the same group without a shift, if the levels are those of the shift."""
     drawn = sample_group([scene(3.0)], replace(SMALL, edge_share=0), LEVELS, np.random.default_rng(7))
-    pair = architecture(name)
+    pair = architecture("realtime")
     model = pair.start(2)
-    assert isinstance(model, CompactModel | FineModel)
+    assert isinstance(model, CompactModel)
     with torch.no_grad():
         model.disparity.sharpness.fill_(1000.0)  # untrained as it is, it takes the least deviation at its word
 
@@ -265,18 +263,12 @@ def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None
         torch.testing.assert_close(found.model.state_dict()[name], value, atol=1e-5, rtol=1e-4)
 
 
-def test_the_larger_pair_begins_with_the_small_ones_disparity(tmp_path: Path) -> None:
+def test_a_run_does_not_begin_with_the_weights_of_another_model(tmp_path: Path) -> None:
     train_small(tmp_path, 1, "small", model="realtime")
     given = load_weights(tmp_path / "small.safetensors")
-    model = architecture("fine").start(1)
-    before = {name: value.clone() for name, value in model.state_dict().items()}
-    begin_from(model, given.model)
-    for name, value in model.state_dict().items():
-        wanted = given.model.state_dict()[name] if name.startswith("disparity.") else before[name]
-        torch.testing.assert_close(value, wanted, atol=0, rtol=0)
+    scenes = [plane(2.0, (3, 3), (120, 120))]
+    out, run = tmp_path / "o.safetensors", tmp_path / "r"
     with pytest.raises(InputError, match="of realtime, not of full"):
-        scenes = [plane(2.0, (3, 3), (120, 120))]
-        out, run = tmp_path / "o.safetensors", tmp_path / "r"
         train(TrainConfig(model="full", patches=SMALL), Runtime("cpu"), scenes, [], out, run, print, lambda: False, given)
 
 
@@ -338,7 +330,7 @@ def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_p
         train(config, Runtime(device="cpu"), *arguments)
 
 
-@pytest.mark.parametrize("model", ["full", "realtime", "fine"])
+@pytest.mark.parametrize("model", ["full", "realtime"])
 def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path, model: str) -> None:
     config = TrainConfig(model=model, learning_rate=3e-4, warm_up_steps=1, loss=LossConfig(matching_steps=0), patches=SMALL)
     trainer = Trainer(config, torch.device("cpu"), tmp_path)

@@ -15,7 +15,7 @@ from lfcore.weights import load_weights
 from lfcore.weights_header import FORMAT, read_stated
 
 
-@pytest.mark.parametrize("model", ["full", "fine", "realtime", "single"])
+@pytest.mark.parametrize("model", ["full", "realtime", "single"])
 def test_a_shipped_file_states_what_loading_finds(model: str) -> None:
     stated, loaded = read_stated(weights_path(model)), load_weights(weights_path(model))
     assert stated is not None

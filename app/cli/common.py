@@ -51,8 +51,8 @@ def add_model(parser: argparse.ArgumentParser) -> None:
         "--model",
         default="full",
         metavar="NAME",
-        help="full (the paper's two networks, default), fine (a larger pair of this program's), realtime (a small pair), "
-        "planesweep (without networks), mean (average of the corners), or a .safetensors file",
+        help="full (the paper's two networks, default), realtime (a small pair of this program's), single (one network, "
+        "without disparity), planesweep (without networks), mean (average of the corners), or a .safetensors file",
     )
 
 

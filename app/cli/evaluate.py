@@ -42,7 +42,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         action="append",
         dest="models",
         metavar="NAME",
-        help="full (default), fine, realtime, single, planesweep, mean, or a .safetensors file; several stand side by side",
+        help="full (default), realtime, single, planesweep, mean, or a .safetensors file; several stand side by side",
     )
     parser.add_argument(
         "--protocol",

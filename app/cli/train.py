@@ -38,10 +38,10 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     )
     parser.add_argument(
         "--model",
-        choices=["full", "fine", "realtime", "single"],
+        choices=["full", "realtime", "single"],
         default="full",
-        help="what to train: the paper's networks (full, the default), the larger pair of this program (fine), the small one "
-        "(realtime), or the paper's one-network ablation (single)",
+        help="what to train: the paper's networks (full, the default), the small pair of this program (realtime), or the "
+        "paper's one-network ablation (single)",
     )
     parser.add_argument(
         "--data",
@@ -94,7 +94,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "--init",
         metavar="FILE",
         type=Path,
-        help="weights to go on from, in place of random ones; fine may begin with those of realtime",
+        help="weights to go on from, in place of random ones",
     )
     parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
     parser.add_argument(

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import torch
@@ -16,10 +15,9 @@ from torch import Tensor
 
 from lfcore.compact import CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
-from lfcore.fine import FineModel, initialise_fine
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
-from lfcore.planesweep import Levels, Window, luminance, plane_sweep
+from lfcore.planesweep import Levels, Window, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tone import root_tone
 from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
@@ -162,7 +160,7 @@ class CompactPair:
         assert isinstance(model, CompactModel)
         places = _places(batch)
         disparity = self._disparity(model, batch, places, autocast)
-        warped = _BatchWarp(places, batch).pictures(disparity)
+        warped = _toned_and_warped(places, batch, disparity)
         with autocast():
             image = model.colour(warped, disparity, batch.positions)  # (., 3, P, P)
         inside = slice(self.RIM, -self.RIM)
@@ -177,39 +175,6 @@ class CompactPair:
         with autocast():
             disparity: Tensor = model.disparity(features)  # (., 1, P, P)
         return disparity
-
-
-class FinePair:
-    """The larger pair, whose first disparity network is the small pair's."""
-
-    RIM = 12
-
-    def levels(self) -> Levels:
-        """See Architecture."""
-        return FineModel().config.levels
-
-    def start(self, seed: int) -> Model:
-        """See Architecture."""
-        model = FineModel()
-        initialise_fine(model, seed)
-        return model
-
-    def prepare(self, model: Model) -> None:
-        """See Architecture."""
-
-    def plain(self, model: Model) -> Model:
-        """See Architecture."""
-        assert isinstance(model, FineModel)
-        return _copied(model, FineModel(model.config))
-
-    def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
-        """See Architecture."""
-        assert isinstance(model, FineModel)
-        places = _places(batch)
-        features = _half_sweep(places, batch, model.config.levels)
-        result = model(features, _BatchWarp(places, batch), batch.positions, autocast)  # pictures (., 3, P, P)
-        inside = slice(self.RIM, -self.RIM)
-        return Prediction(result.image[:, :, inside, inside], self.RIM, result.disparities[:, :1], 0)
 
 
 class SingleNetwork:
@@ -251,7 +216,6 @@ class SingleNetwork:
 _ARCHITECTURES: dict[str, Architecture] = {
     "full": PaperPair(),
     "realtime": CompactPair(),
-    "fine": FinePair(),
     "single": SingleNetwork(),
 }
 
@@ -259,18 +223,6 @@ _ARCHITECTURES: dict[str, Architecture] = {
 def architecture(name: str) -> Architecture:
     """By the name of a model, one of lfcore.models.TRAINABLE."""
     return _ARCHITECTURES[name]
-
-
-# Models by whose weights another can begin.
-STARTS = {name: (name,) for name in _ARCHITECTURES} | {"fine": ("fine", "realtime")}
-
-
-def begin_from(model: Model, initial: Model) -> None:
-    """Copy weights: all of them, or of another model of STARTS those of the part that both have."""
-    if isinstance(model, FineModel) and isinstance(initial, CompactModel):
-        model.disparity.load_state_dict(initial.disparity.state_dict())
-    else:
-        model.load_state_dict(initial.state_dict())
 
 
 def _copied(model: Model, onto: Model) -> Model:
@@ -298,34 +250,15 @@ def _half_sweep(places: Sequence[_Place], batch: Batch, levels: Levels) -> Tenso
     )
 
 
-class _BatchWarp:
-    """See lfcore.fine.Warp: the inputs of all groups."""
-
-    def __init__(self, places: Sequence[_Place], batch: Batch) -> None:
-        self._batch = batch
-        self._toned = [_Place(root_tone(place.images), place.window) for place in places]
-        self._places = places
-
-    def pictures(self, disparity: Tensor) -> Tensor:
-        """See Warp."""
-        return self._warped(self._toned, disparity)
-
-    def luminances(self, disparity: Tensor) -> list[Tensor]:
-        """See Warp."""
-        return list(self._warped(self._lumas, disparity).split(1, 1))
-
-    @cached_property
-    def _lumas(self) -> list[_Place]:
-        return [_Place(root_tone(luminance(place.images)).unsqueeze(2), place.window) for place in self._places]
-
-    def _warped(self, places: Sequence[_Place], disparity: Tensor) -> Tensor:
-        pieces = zip(places, disparity.split(self._batch.sizes), self._batch.offsets, self._batch.groups, strict=True)
-        return torch.cat(
-            [
-                _quick_warp_inputs(place.images, piece - group.shift, offsets, place.window)
-                for place, piece, offsets, group in pieces
-            ]
-        )
+def _toned_and_warped(places: Sequence[_Place], batch: Batch, disparity: Tensor) -> Tensor:
+    """The inputs of all groups in the root tone, warped by (sum of B, 1, P, P): (sum of B, 12, P, P)."""
+    pieces = zip(places, disparity.split(batch.sizes), batch.offsets, batch.groups, strict=True)
+    return torch.cat(
+        [
+            _quick_warp_inputs(root_tone(place.images), piece - group.shift, offsets, place.window)
+            for place, piece, offsets, group in pieces
+        ]
+    )
 
 
 def _quick_warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, window: Window) -> Tensor:

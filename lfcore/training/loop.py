@@ -27,7 +27,7 @@ from lfcore.metrics import k16, k16_view
 from lfcore.models import Model
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
-from lfcore.training.architectures import STARTS, Batch, architecture, begin_from
+from lfcore.training.architectures import Batch, architecture
 from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loss import LossConfig, StepLoss
@@ -165,9 +165,8 @@ def _settled(config: TrainConfig, initial: Weights | None, teacher: Weights | No
     config = replace(config, teacher=teacher.digest if teacher else "")
     if initial is None:
         return config
-    if initial.model.config.name not in STARTS[config.model]:
-        wanted = " or ".join(STARTS[config.model])
-        raise InputError(f"The weights to go on from are those of {initial.model.config.name}, not of {wanted}.")
+    if initial.model.config.name != config.model:
+        raise InputError(f"The weights to go on from are those of {initial.model.config.name}, not of {config.model}.")
     return replace(config, initial=initial.digest)
 
 
@@ -190,7 +189,7 @@ class Trainer:
         self._architecture = architecture(config.model)
         self._model = self._architecture.start(config.seed)
         if initial is not None:
-            begin_from(self._model, initial)
+            self._model.load_state_dict(initial.state_dict())
         self._architecture.prepare(self._model)
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
