@@ -82,7 +82,7 @@ def test_refocus_stereo_and_slices(screen: VirtualScreen, tmp_path: Path, monkey
         wait_until(lambda: shows(refocused(scene, 0.0), TOLERANCE), "the picture focused at 0")
         assert not shows(here, 10 / 255)
         x, y = place(Zoom(1.0), (VIEW[1], VIEW[0]), area).to_window((70.5, 60.5))
-        screen.xdotool("mousemove", int(x), int(y), "sleep", 0.2, "click", 1)
+        screen.click(int(x), int(y))
         screen.xdotool("mousemove", *BESIDE)
         wait_until(lambda: shows(here, TOLERANCE), "the picture focused where it was clicked")
 
@@ -121,7 +121,7 @@ def test_refocus_stereo_and_slices(screen: VirtualScreen, tmp_path: Path, monkey
         wait_until(shows_slice, "the slice")
 
         # A click in it goes to that u; the slope of what is under the cursor has been its disparity.
-        screen.xdotool("mousemove", int(below.x) + 300, int(below.y) + 10, "sleep", 0.2, "click", 1)
+        screen.click(int(below.x) + 300, int(below.y) + 10)
         u = place_in_slice(10.5 / below.height)
         screen.xdotool("mousemove", 150, 560)
 

@@ -72,6 +72,12 @@ class VirtualScreen:
         """Mouse and keys."""
         subprocess.run(["xdotool", *map(str, words)], env=self.environment(), check=True, timeout=PATIENCE)
 
+    def click(self, x: int, y: int) -> None:
+        """Move the mouse there, press and release the left button, and stay for a moment."""
+        for words in (("mousemove", x, y), ("mousedown", 1), ("mouseup", 1)):
+            self.xdotool(*words)
+            time.sleep(_HAND_SECONDS)
+
     def drag(self, start: tuple[int, int], delta: tuple[int, int]) -> None:
         """Move the mouse to `start`, press the left button and move by `delta`; the button stays down."""
         self.xdotool("mousemove", *start)
