@@ -86,10 +86,11 @@ class NetworkSpeed:
 class ModelSpeed:
     """Medians over several viewpoints after a warm-up.
 
-    `stages`: seconds of each. `networks`: the speed of each stage that is a network; what tiles compute twice and filled
-    channels are not counted. `tflops` and `share_of_ceiling` are of the networks together, over their seconds; None for
-    models without. `peak_mib`: most memory that the process held, with Python, torch and the light field, in MiB, or None
-    where the system does not tell (Windows).
+    `stages`: seconds of each. `networks`: the speed of each stage that is a network, counted in the operations that its
+    convolutions ask for: what tiles compute twice and filled channels do not count, and where transforms save operations
+    (lfcore.fourier, lfcore.winograd) it can be above the ceiling. `tflops` and `share_of_ceiling` are of the networks together,
+    over their seconds; None for models without. `peak_mib`: most memory that the process held, with Python, torch and the
+    light field, in MiB, or None where the system does not tell (Windows).
     """
 
     seconds_per_view: float
