@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfcore.fourier import LEAST_CHANNELS, FourierConvolution
+from lfcore.layers import DirectConvolution
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Window
 
@@ -139,8 +140,7 @@ class TunedStack:
 
 def _directly(layer: nn.Conv2d, dtype: torch.dtype) -> Layer:
     assert layer.bias is not None
-    weight, bias = layer.weight.to(dtype=dtype, memory_format=torch.channels_last), layer.bias.to(dtype)
-    return lambda x: F.conv2d(x, weight, bias).relu_()
+    return partial(DirectConvolution(layer.weight.to(dtype), layer.bias.to(dtype)), positive=True)
 
 
 def _by_fourier(layer: nn.Conv2d, dtype: torch.dtype) -> Layer:
