@@ -575,12 +575,14 @@ class Controller:
                 return
 
     def _step_ms(self, instant_ms: float | None) -> float | None:
+        """How long what is on screen took: the networks, where it is their step, else the drawing."""
         if self.step is Step.CAPTURED:
             return None
-        if self.picture is not None:
-            seconds = self.picture.synthesis.timings.get("total")
-            return None if seconds is None else 1e3 * seconds
-        return instant_ms
+        synthesized = self.newest if self.step is Step.REALTIME else self.picture
+        if synthesized is None:
+            return instant_ms
+        seconds = synthesized.synthesis.timings.get("total")
+        return None if seconds is None else 1e3 * seconds
 
     def _busy(self) -> str:
         wish = self._asking.wish

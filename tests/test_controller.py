@@ -380,9 +380,13 @@ def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Progr
     program.tick(0.0)
     assert controller.picture is None
     assert controller.step is Step.REALTIME
+    assert controller.newest is not None
+    of_networks = 1e3 * controller.newest.synthesis.timings["total"]
+    assert controller.readout(3.5).step_ms == of_networks != 3.5  # not that of carrying, which is no step of theirs
     controller.state.move_to(0.9, 0.5)
     program.tick(0.0)
     assert controller.step is Step.INSTANT  # too far to be carried
+    assert controller.readout(3.5).step_ms == 3.5
 
 
 def moves_on(program: Program, steps: int) -> list[float]:
