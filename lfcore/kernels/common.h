@@ -69,15 +69,6 @@ PART Eight eight_at(const float *values) {
     return eight;
 }
 
-/* As wide as the widest registers, for plain arithmetic that gains from them. */
-typedef float Sixteen __attribute__((vector_size(64)));
-
-PART Sixteen sixteen_at(const float *values) {
-    Sixteen sixteen;
-    memcpy(&sixteen, values, sizeof sixteen);
-    return sixteen;
-}
-
 /* Weights of the samples at -1, 0, 1, 2 around a place t in [0, 1) past sample 0 (Keys 1981): a cubic in their distances, one
  * for the outer two and one for the inner two. */
 PART Four cubic_taps(float t, float a) {

@@ -7,6 +7,15 @@
 #define LANES 16
 #define SIZE 16 /* of a tile, px */
 
+/* As wide as the widest registers, which plain arithmetic gains from. */
+typedef float Sixteen __attribute__((vector_size(4 * LANES)));
+
+PART Sixteen sixteen_at(const float *values) {
+    Sixteen sixteen;
+    memcpy(&sixteen, values, sizeof sixteen);
+    return sixteen;
+}
+
 /* Of the angles 2 pi n / 16. */
 static const float COSINES[10] = {1.0f,           0.92387953251f,  0.70710678119f,  0.38268343236f, 0.0f,
                                   -0.38268343236f, -0.70710678119f, -0.92387953251f, -1.0f,          -0.92387953251f};
