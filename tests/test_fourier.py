@@ -19,7 +19,7 @@ def case(channels: tuple[int, int], kernel: int, size: tuple[int, int], mean: fl
     return layer, x, F.conv2d(x.double(), layer.weight.double(), layer.bias.double()).relu()
 
 
-@pytest.mark.parametrize("kernel", [1, 3, 5, 7, 16 - 1])
+@pytest.mark.parametrize("kernel", [1, 3, 5, 7, 15])
 @pytest.mark.parametrize(
     ("channels", "size"),
     [
