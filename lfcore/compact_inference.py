@@ -13,7 +13,8 @@ from torch import Tensor, nn
 
 from lfcore.compact import CompactModel, ResidualBlock, log_nearness
 from lfcore.compact_parts import MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
-from lfcore.layers import Layer, fastest_layer
+from lfcore.layers import Layer, make_layer
+from lfcore.tuned_stack import Tuning
 
 # The scales that CompactDisparity gives its features, without the shift, which `sweep_input` gives.
 _MEAN_SCALE, _MEAN_SHIFT, _DEVIATION_SCALE = 4.0, -2.0, 10.0
@@ -38,32 +39,51 @@ class Coloured:
 
 
 class CompactInference:
-    """Both networks of a model, whose weights are copied."""
+    """Both networks of a model, whose weights are copied, by the type and the way that `tuning` says."""
 
-    def __init__(self, model: CompactModel, dtype: torch.dtype) -> None:
-        self.dtype = dtype
+    def __init__(self, model: CompactModel, tuning: Tuning) -> None:
+        self.dtype, self._winograd = tuning.dtype, tuning.winograd
         config, disparity, colour = model.config, model.disparity, model.colour
         levels = config.levels.count
         with torch.no_grad():
             features = torch.ones(2 * levels)
             features[levels:] = _DEVIATION_SCALE / _MEAN_SCALE  # the sweep's input carries the scale of the means
-            self._stem = _layer(disparity.stem, dtype, features)
-            self._skip = _layer(disparity.skip, dtype, features)
-            self._blocks = _block_layers(disparity.blocks, dtype)
+            self._stem = self._layer(disparity.stem, features)
+            self._skip = self._layer(disparity.skip, features)
+            self._blocks = self._block_layers(disparity.blocks)
             # By phase, then channel: so that a pixel's channels stay together when the phases are put side by side.
-            self._rise = _layer(disparity.rise, dtype, outputs=_by_phase(config.fine_width))
-            self._join = _layer(disparity.join, dtype)
+            self._rise = self._layer(disparity.rise, outputs=_by_phase(config.fine_width))
+            self._join = self._layer(disparity.join)
             sharpness = float(disparity.sharpness) / _MEAN_SCALE
             self._parts = parts_of(
                 Heads(_matrix(disparity.score), _matrix(disparity.spread), config.levels.values(), sharpness)
             )
             x_scale = torch.cat((torch.full((12,), 4.0), torch.full((48,), 10.0), torch.ones(2), torch.full((2,), 0.2)))
             order = gathered_order()
-            self._colour_stem = _layer(colour.stem, dtype, x_scale, order)
-            self._straight = _layer(colour.straight, dtype, x_scale, order, _by_phase(3))
-            self._colour_blocks = _block_layers(colour.blocks, dtype)
-            self._weights, self._residual = _layer(colour.weights, dtype), _layer(colour.residual, dtype, outputs=_by_phase(3))
+            self._colour_stem = self._layer(colour.stem, x_scale, order)
+            self._straight = self._layer(colour.straight, x_scale, order, _by_phase(3))
+            self._colour_blocks = self._block_layers(colour.blocks)
+            self._weights, self._residual = self._layer(colour.weights), self._layer(colour.residual, outputs=_by_phase(3))
             self._nearness = float(colour.nearness)
+
+    def _layer(
+        self, convolution: nn.Conv2d, scale: Tensor | None = None, inputs: Tensor | None = None, outputs: Tensor | None = None
+    ) -> Layer:
+        """A convolution whose input channels are multiplied by `scale`, and whose channels are in another order."""
+        weight, bias = convolution.weight.detach(), convolution.bias
+        if scale is not None:
+            weight = weight * scale.view(1, -1, 1, 1)
+        if inputs is not None:
+            weight = weight[:, inputs]
+        bias = None if bias is None else bias.detach()
+        if outputs is not None:
+            weight, bias = weight[outputs], None if bias is None else bias[outputs]
+        (stride, _), padding, (dilation, _) = convolution.stride, convolution.padding[0], convolution.dilation
+        assert isinstance(padding, int)
+        return make_layer(weight, bias, self.dtype, self._winograd, stride, padding, dilation)
+
+    def _block_layers(self, blocks: nn.Sequential) -> list[tuple[Layer, Layer]]:
+        return [(self._layer(block.first), self._layer(block.second)) for block in blocks if isinstance(block, ResidualBlock)]
 
     def prepared(self, toned: Tensor) -> Tensor:
         """Corner views (4, 3, H, W) in the root tone, continued beyond their edges, as `warp` takes them."""
@@ -99,31 +119,6 @@ class CompactInference:
 def _by_phase(channels: int) -> Tensor:
     """The order of a pixel shuffle's channels, by channel, then phase, as one by phase, then channel."""
     return torch.arange(PHASES * channels).view(channels, PHASES).T.flatten()
-
-
-def _layer(
-    convolution: nn.Conv2d,
-    dtype: torch.dtype,
-    scale: Tensor | None = None,
-    inputs: Tensor | None = None,
-    outputs: Tensor | None = None,
-) -> Layer:
-    """A convolution in `dtype` whose input channels are multiplied by `scale`, and whose channels are in another order."""
-    weight, bias = convolution.weight.detach(), convolution.bias
-    if scale is not None:
-        weight = weight * scale.view(1, -1, 1, 1)
-    if inputs is not None:
-        weight = weight[:, inputs]
-    bias = None if bias is None else bias.detach()
-    if outputs is not None:
-        weight, bias = weight[outputs], None if bias is None else bias[outputs]
-    padding = convolution.padding[0]
-    assert isinstance(padding, int)
-    return fastest_layer(weight, bias, dtype, convolution.stride[0], padding, convolution.dilation[0])
-
-
-def _block_layers(blocks: nn.Sequential, dtype: torch.dtype) -> list[tuple[Layer, Layer]]:
-    return [(_layer(block.first, dtype), _layer(block.second, dtype)) for block in blocks if isinstance(block, ResidualBlock)]
 
 
 def _matrix(convolution: nn.Conv2d) -> tuple[Tensor, Tensor]:

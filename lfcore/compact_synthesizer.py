@@ -20,6 +20,7 @@ from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
+from lfcore.tuned_stack import Tuning
 from lfcore.tuning import machine_tuning
 
 # How far the inputs are continued beyond their edges, px: 21 px of disparity at a viewpoint 0.25 outside, and the taps.
@@ -50,12 +51,13 @@ class CompactSynthesizer:
     The warped inputs of its syntheses are put together when first asked for: that would take as long as a network.
     """
 
-    def __init__(self, model: CompactModel, key: str, dtype: torch.dtype | None = None) -> None:
+    def __init__(self, model: CompactModel, key: str, tuning: Tuning | None = None) -> None:
         self.name = model.config.name
         self.key = key
         self.config = model.config
-        self.dtype = dtype or machine_tuning().dtype
-        self._networks = CompactInference(model, self.dtype)
+        tuning = tuning or machine_tuning()
+        self.dtype = tuning.dtype
+        self._networks = CompactInference(model, tuning)
         self._size = 0, 0
         self._corners: Tensor | None = None  # prepared for the warp
         self._luma: Tensor | None = None  # (4, 1, H' / 2 + REACH, W' / 2 + REACH), as the sweep wants it

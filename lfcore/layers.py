@@ -1,4 +1,4 @@
-"""Convolutions of the small pair as they are computed for synthesis, with what comes directly before and after them."""
+"""Convolutions as they are computed for synthesis, with what comes directly before and after them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.kernels import compiled
-from lfcore.winograd import LEAST_CHANNELS, WinogradConvolution
-
-# With fewer channels out, the transforms cost as much as they save.
-_LEAST_WORTH = 32
+from lfcore.winograd import WinogradConvolution, can_compute
 
 
 class Layer(Protocol):
@@ -38,10 +34,16 @@ class DirectConvolution:
         return y.relu_() if positive else y
 
 
-def fastest_layer(weight: Tensor, bias: Tensor | None, dtype: torch.dtype, stride: int, padding: int, dilation: int) -> Layer:
-    """How a convolution is computed fastest in a type. weight: (out, in, k, k) float32."""
-    outputs, inputs, kernel, _ = weight.shape
-    winograd = compiled() and dtype == torch.float32 and kernel == 3 and stride == 1
-    if winograd and inputs >= LEAST_CHANNELS and outputs >= _LEAST_WORTH:
-        return WinogradConvolution(weight, bias, padding, dilation)
+def make_layer(
+    weight: Tensor,
+    bias: Tensor | None,
+    dtype: torch.dtype,
+    winograd: bool,
+    stride: int = 1,
+    padding: int = 0,
+    dilation: int = 1,
+) -> Layer:
+    """A layer in a type. weight: (out, in, k, k) float32. winograd: by Winograd's transforms, where it can be."""
+    if winograd and stride == 1 and can_compute(weight, dtype):
+        return WinogradConvolution(weight, bias, padding, dilation, dtype)
     return DirectConvolution(weight.to(dtype), None if bias is None else bias.to(dtype), stride, padding, dilation)

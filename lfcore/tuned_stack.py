@@ -11,9 +11,10 @@ import torch
 from torch import Tensor, nn
 
 from lfcore.fourier import LEAST_CHANNELS, FourierConvolution
-from lfcore.layers import DirectConvolution
+from lfcore.layers import make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Window
+from lfcore.winograd import can_compute
 
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
@@ -30,11 +31,13 @@ class Tuning:
     channel_multiple: int = 1  # channels of hidden layers are filled up with zeros to a multiple of this
     tile_pixels: int = TILE_PIXELS
     fourier: bool = False  # whether convolutions are computed by Fourier transforms (lfcore.fourier), channels as they are
+    # Whether those with 3 x 3 kernels are by Winograd's (lfcore.winograd): of the small pair, and beside Fourier transforms.
+    winograd: bool = False
 
     @classmethod
-    def by_fourier(cls, dtype: torch.dtype) -> Tuning:
+    def by_fourier(cls, dtype: torch.dtype, winograd: bool = False) -> Tuning:
         """With Fourier transforms: in tiles that are larger, since the transforms' own have overlaps already."""
-        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, True)
+        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, True, winograd)
 
     def tiles(self, height: int, width: int) -> Iterator[Tile]:
         """Cover a picture with tiles of about equal size, from the top left."""
@@ -108,8 +111,7 @@ class TunedStack:
         least = LEAST_CHANNELS if tuning.fourier else 1
         filled = [_filled(layer, tuning.channel_multiple, least) for layer in convolutions]
         self._input_channels = filled[0].in_channels
-        compute = _by_fourier if tuning.fourier else _directly
-        self._hidden = [compute(layer, tuning.dtype) for layer in filled]
+        self._hidden = [_tuned(layer, tuning) for layer in filled]
         self._last = stack.last
         self._outputs = convolutions[-1].out_channels
 
@@ -138,13 +140,12 @@ class TunedStack:
         return result
 
 
-def _directly(layer: nn.Conv2d, dtype: torch.dtype) -> Layer:
+def _tuned(layer: nn.Conv2d, tuning: Tuning) -> Layer:
+    """The layer with its ReLU."""
     assert layer.bias is not None
-    return partial(DirectConvolution(layer.weight.to(dtype), layer.bias.to(dtype)), positive=True)
-
-
-def _by_fourier(layer: nn.Conv2d, dtype: torch.dtype) -> Layer:
-    return FourierConvolution(layer, dtype)
+    if tuning.fourier and not (tuning.winograd and can_compute(layer.weight, tuning.dtype)):
+        return FourierConvolution(layer, tuning.dtype)
+    return partial(make_layer(layer.weight, layer.bias, tuning.dtype, tuning.fourier and tuning.winograd), positive=True)
 
 
 def _filled(layer: nn.Conv2d, multiple: int, least: int) -> nn.Conv2d:

@@ -1,5 +1,5 @@
-"""How convolutions are computed on this machine: number type, directly or by Fourier transforms, width of tiles, filled
-channels. Measured once, remembered.
+"""How convolutions are computed on this machine: number type, directly or by transforms, width of tiles, filled channels.
+Measured once, remembered.
 
 What is fastest differs widely: bfloat16 gains four-fold with AMX and loses without AVX-512; channel counts that are multiples
 of 32 gain three-fold with AMX and lose a quarter without; Fourier transforms gain three-fold without AMX. So the layers
@@ -25,8 +25,10 @@ import torch
 from lfcore.atomic import atomic_path
 from lfcore.errors import OutputError
 from lfcore.kernels import compiled
+from lfcore.layers import Layer, make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
+from lfcore.winograd import can_compute
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
 _SURE_ROUNDS = 4
@@ -60,28 +62,53 @@ def retune() -> Tuning:
 
 
 def measured(
-    widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS, fourier: bool | None = None
+    widths: Sequence[int] = _WIDTHS, channels: Sequence[int] = _CHANNELS, transforms: bool | None = None
 ) -> tuple[Tuning, bool]:
     """Type, way and filling first, at a small width, then the width; and whether there was time to time all choices well.
 
-    fourier: whether Fourier transforms are among the choices; None: where they are compiled. The plain choices come first and
-    stay unless another gains clearly: timings are never free of noise, and bfloat16 has to be worth its lost digits.
+    transforms: whether convolutions by transforms are among the choices; None: where they are compiled. The plain choices come
+    first and stay unless another gains clearly: timings are never free of noise, and bfloat16 has to be worth its lost digits.
     """
     began = time.perf_counter()
-    by_fourier = compiled() if fourier is None else fourier
-    exact_kinds = [Tuning(torch.float32, _SMALL_WIDTH, multiple) for multiple in channels]
-    if by_fourier:
-        exact_kinds.insert(1, replace(Tuning.by_fourier(torch.float32), tile_width=_SMALL_WIDTH))
-    short_kinds = [replace(kind, dtype=torch.bfloat16) for kind in exact_kinds]
+    by_transforms = compiled() if transforms is None else transforms
+    exact_kinds, short_kinds = (_kinds(dtype, channels, by_transforms) for dtype in (torch.float32, torch.bfloat16))
     # By turns, so that where time is short the plain ones of both types are compared.
     kinds = [kind for pair in zip(exact_kinds, short_kinds, strict=True) for kind in pair]
-    cost, sure_kind = _fastest(kinds, 4 if by_fourier else 2, began + _BUDGET_SECONDS / 2)
+    cost, sure_kind = _fastest(kinds, 4 if by_transforms else 2, began + _BUDGET_SECONDS / 2)
     kind = _clearly_least([_clearly_least(same, cost, 0.9) for same in (exact_kinds, short_kinds)], cost, 0.8)
     if kind.fourier:
-        return Tuning.by_fourier(kind.dtype), sure_kind
+        return Tuning.by_fourier(kind.dtype, kind.winograd), sure_kind
     shapes = [replace(kind, tile_width=width) for width in widths]
     cost, sure_shape = _fastest(shapes, 0, began + _BUDGET_SECONDS)
     return _clearly_least(shapes, cost, 0.93), sure_kind and sure_shape
+
+
+def _kinds(dtype: torch.dtype, channels: Sequence[int], by_transforms: bool) -> list[Tuning]:
+    """The choices in a type, of a small width, the plain one first."""
+    winograd = by_transforms and winograd_gains(dtype)
+    kinds = [Tuning(dtype, _SMALL_WIDTH, multiple, winograd=winograd) for multiple in channels]
+    if by_transforms:
+        kinds.insert(1, replace(Tuning.by_fourier(dtype, winograd), tile_width=_SMALL_WIDTH))
+    return kinds
+
+
+def winograd_gains(dtype: torch.dtype) -> bool:
+    """Whether a layer like those of the small pair is clearly faster by Winograd's transforms."""
+    with torch.random.fork_rng(devices=[]), torch.inference_mode():
+        weight, bias = torch.randn(48, 48, 3, 3), torch.randn(48)
+        x = torch.randn(1, 48, 96, 144).to(dtype).contiguous(memory_format=torch.channels_last)
+        if not can_compute(weight, dtype):
+            return False
+        direct, transformed = (make_layer(weight, bias, dtype, winograd, padding=1) for winograd in (False, True))
+        seconds = [(_seconds(direct, x), _seconds(transformed, x)) for _ in range(_ROUNDS)]
+    plainly, by_winograd = map(min, zip(*seconds, strict=True))
+    return by_winograd < 0.9 * plainly
+
+
+def _seconds(layer: Layer, x: torch.Tensor) -> float:
+    start = time.perf_counter()
+    layer(x, positive=True)
+    return time.perf_counter() - start
 
 
 def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: float) -> Tuning:
@@ -138,9 +165,11 @@ def remembered() -> Tuning | None:
     values = _file_content().get(_machine_key(), {})
     try:
         dtype = _DTYPES[str(values["dtype"])]
+        winograd = values["winograd"] is True
         if values["fourier"] is True:
-            return Tuning.by_fourier(dtype)
-        return Tuning(dtype, _within(values["tile_width"], 16, 4096), _within(values["channel_multiple"], 1, 64))
+            return Tuning.by_fourier(dtype, winograd)
+        width, multiple = _within(values["tile_width"], 16, 4096), _within(values["channel_multiple"], 1, 64)
+        return Tuning(dtype, width, multiple, winograd=winograd)
     except (KeyError, ValueError):
         return None
 
@@ -163,6 +192,7 @@ def _remember(tuning: Tuning) -> None:
         "tile_width": tuning.tile_width,
         "channel_multiple": tuning.channel_multiple,
         "fourier": tuning.fourier,
+        "winograd": tuning.winograd,
     }
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

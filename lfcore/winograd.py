@@ -1,47 +1,77 @@
-"""Convolution with 3 x 3 kernels in float32 by Winograd's transforms: a quarter of the multiplications.
+"""Convolution with 3 x 3 kernels by Winograd's transforms: a quarter of the multiplications.
 
 F(4 x 4, 3 x 3) of Lavin and Gray (CVPR 2016): the picture is cut into tiles of 6 x 6 px, which overlap; between a transform and
-its inverse, a convolution is a product of matrices at each of 36 places, (tiles, channels in) by (channels in, channels
-out), and gives 4 x 4 px: 36 multiplications a tile and pair of channels in place of 144. Compiled (lfcore.kernels). Numbers
-lose about a digit, so in bfloat16 it would not do.
+its inverse, a convolution is a product of matrices at each of 36 places, (tiles, channels in) by (channels in,
+channels out), and gives 4 x 4 px: 36 multiplications a tile and pair of channels in place of 144. Compiled (lfcore.kernels).
+
+The polynomials of the transforms are taken at 0, at infinity, and at the square roots of 1/2 and 2, with both signs: numbers
+lose fewer digits than with 1 and 2 in their place, so that what lies between the transforms may be bfloat16.
 """
 
 from __future__ import annotations
+
+from math import sqrt
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.kernels import WINOGRAD_COLUMNS, WINOGRAD_LEAST_CHANNELS, winograd_convolution
+from lfcore.kernels import WINOGRAD_COLUMNS, WINOGRAD_LEAST_CHANNELS, can_convolve, winograd_convolution
 
-LEAST_CHANNELS = WINOGRAD_LEAST_CHANNELS  # of the input and of the result
+_LEAST_WORTH = 32  # channels out in float32: with fewer, the transforms cost as much as they save
+_POINTS = (-1.5, 0.5, sqrt(0.5)), (6.0, 2.0, sqrt(2.0))  # what a pair's rows are divided by, their squares, they themselves
 
 
 class WinogradConvolution:
-    """See lfcore.layers.Layer. weight: (O, C, 3, 3) float32; bias: (O,) float32, or None. Weights are copied."""
+    """See lfcore.layers.Layer. weight: (O, C, 3, 3) float32; bias: (O,) float32, or None. Weights are copied.
 
-    def __init__(self, weight: Tensor, bias: Tensor | None, padding: int = 0, dilation: int = 1) -> None:
-        outputs, inputs, *kernel = weight.shape
-        assert kernel == [3, 3] and min(outputs, inputs) >= LEAST_CHANNELS
-        self._padding, self._dilation = padding, dilation
-        self._bias = torch.zeros(outputs) if bias is None else bias.detach().float().clone()
-        self._weights = _transformed(weight.detach())
+    dtype: of pictures, and of what lies between the transforms. `can_compute` tells whether these arguments are taken.
+    """
+
+    def __init__(
+        self, weight: Tensor, bias: Tensor | None, padding: int = 0, dilation: int = 1, dtype: torch.dtype = torch.float32
+    ) -> None:
+        assert can_compute(weight, dtype)
+        self._padding, self._dilation, self._dtype = padding, dilation, dtype
+        self._bias = torch.zeros(weight.shape[0]) if bias is None else bias.detach().float().clone()
+        matrices = _transformed(weight.detach())
+        self._weights = _by_column(matrices) if dtype == torch.float32 else _by_pair(matrices).to(dtype)
 
     def __call__(self, x: Tensor, *, of_positive: bool = False, plus: Tensor | None = None, positive: bool = False) -> Tensor:
         """See Layer."""
         _, _, height, width = x.shape
         lost = 2 * (self._dilation - self._padding)
         shape = 1, self._bias.numel(), height - lost, width - lost
-        out = torch.empty(shape, memory_format=torch.channels_last)
+        out = torch.empty(shape, dtype=self._dtype, memory_format=torch.channels_last)
         winograd_convolution(x, self._weights, self._bias, plus, out, self._padding, self._dilation, of_positive, positive)
         return out
 
 
+def can_compute(weight: Tensor, dtype: torch.dtype) -> bool:
+    """Whether there is a WinogradConvolution for weights (O, C, k, k) in a type."""
+    outputs, inputs, *kernel = weight.shape
+    enough = dtype != torch.float32 or (inputs >= WINOGRAD_LEAST_CHANNELS and outputs >= _LEAST_WORTH)
+    return kernel == [3, 3] and can_convolve(dtype) and enough
+
+
 def _transformed(weight: Tensor) -> Tensor:
-    """Kernels (O, C, 3, 3) to matrices (36, groups, C, WINOGRAD_COLUMNS)."""
-    rows = [[1 / 4, 0, 0], *([-1 / 6, sign / 6, -1 / 6] for sign in (-1, 1))]
-    rows += [*([1 / 24, sign / 12, 1 / 6] for sign in (1, -1)), [0, 0, 1]]
-    g = torch.tensor(rows, dtype=torch.float64)
-    matrices = torch.einsum("ia,jb,ocab->ijco", g, g, weight.double()).flatten(0, 1).float()  # (36, C, O)
-    filled = F.pad(matrices, (0, -matrices.shape[2] % WINOGRAD_COLUMNS))
-    return filled.unflatten(2, (-1, WINOGRAD_COLUMNS)).transpose(1, 2).contiguous()
+    """Kernels (O, C, 3, 3) to matrices (36, C, O), O filled up to whole groups."""
+    pairs = [[1 / divisor, sign * point / divisor, square / divisor] for divisor, square, point in _POINTS for sign in (1, -1)]
+    g = torch.tensor([[1.0, 0.0, 0.0], *pairs, [0.0, 0.0, 1.0]], dtype=torch.float64)
+    matrices = torch.einsum("ia,jb,ocab->ijco", g, g, weight.double()).flatten(0, 1).float()
+    return F.pad(matrices, (0, -matrices.shape[2] % WINOGRAD_COLUMNS))
+
+
+def _by_column(matrices: Tensor) -> Tensor:
+    """(36, C, O) to (36, groups, C, WINOGRAD_COLUMNS)."""
+    return matrices.unflatten(2, (-1, WINOGRAD_COLUMNS)).transpose(1, 2).contiguous()
+
+
+def _by_pair(matrices: Tensor) -> Tensor:
+    """(36, C, O) to (36, groups, pairs, WINOGRAD_COLUMNS, 2), channels in the order in which the compiled code pairs them."""
+    channels = matrices.shape[1]
+    whole = channels - channels % 32
+    order = torch.arange(whole).view(-1, 16, 2).transpose(1, 2).flatten()  # of 32 the even ones, then the odd ones
+    ordered = matrices[:, torch.cat((order, torch.arange(whole, channels)))]
+    filled = F.pad(ordered, (0, 0, 0, channels % 2))
+    return filled.unflatten(2, (-1, WINOGRAD_COLUMNS)).unflatten(1, (-1, 2)).permute(0, 3, 1, 4, 2).contiguous()

@@ -12,13 +12,14 @@ from lfcore.lightfield import CORNERS, LightField
 from lfcore.metrics import psnr
 from lfcore.synthesis import Synthesizer
 from lfcore.tone import root_tone, stored_from_root
+from lfcore.tuned_stack import Tuning
 
 
-def untrained(dtype: torch.dtype | None) -> Synthesizer:
+def untrained(tuning: Tuning | None = None) -> Synthesizer:
     """The small pair with the weights from which training starts."""
     model = CompactModel()
     initialise_compact(model, 1)
-    return CompactSynthesizer(model, "test", dtype)
+    return CompactSynthesizer(model, "test", tuning)
 
 
 def test_the_root_tone_has_its_inverse_and_evens_out_shot_noise() -> None:
@@ -54,7 +55,7 @@ def test_nearness_is_in_the_order_of_the_corners() -> None:
 def test_untrained_it_starts_from_the_minimum_of_the_sweep(disparity: float) -> None:
     """Its first guess for a textured plane at a known disparity is near that, and so the picture is near the truth."""
     field = plane(disparity, (3, 3), (72, 92))
-    synthesizer = untrained(torch.float32)
+    synthesizer = untrained(Tuning())
     synthesizer.set_light_field(field)
     found = synthesizer.synthesize(0.5, 0.5)
     assert found.disparity is not None and found.warped is not None
@@ -68,7 +69,7 @@ def test_untrained_it_starts_from_the_minimum_of_the_sweep(disparity: float) -> 
 
 def test_pictures_of_any_size_come_out_whole_and_like_a_larger_ones_part() -> None:
     field = plane(2.0, (2, 2), (61, 83))
-    synthesizer = untrained(torch.float32)
+    synthesizer = untrained(Tuning())
     synthesizer.set_light_field(field)
     found = synthesizer.synthesize(0.3, 0.8)
     assert found.image.shape == (61, 83, 3) and found.image.dtype == np.float32
@@ -78,18 +79,19 @@ def test_pictures_of_any_size_come_out_whole_and_like_a_larger_ones_part() -> No
     assert set(found.timings) == {"features", "disparity", "warp", "colour", "total"}
 
 
-def test_bfloat16_changes_little() -> None:
+@pytest.mark.parametrize("winograd", [False, True])
+def test_bfloat16_changes_little(winograd: bool) -> None:
     field = plane(3.0, (2, 2), (64, 80))
     pictures = []
     for dtype in (torch.float32, torch.bfloat16):
-        synthesizer = untrained(dtype)
+        synthesizer = untrained(Tuning(dtype, winograd=winograd))
         synthesizer.set_light_field(field)
         pictures.append(synthesizer.synthesize(0.4, 0.6).image)
     assert psnr(pictures[0], pictures[1]) > 40
 
 
 def test_the_synthesizer_asks_for_what_it_needs() -> None:
-    synthesizer = untrained(None)
+    synthesizer = untrained()
     with pytest.raises(InputError, match="set_light_field"):
         synthesizer.synthesize(0.5, 0.5)
     synthesizer.set_light_field(LightField(np.zeros((2, 2, 32, 40, 3), np.uint8), "", "", ""))

@@ -9,6 +9,7 @@ from lfcore.compact_parts import MIDDLE, full_size
 from lfcore.compact_synthesizer import REACH
 from lfcore.planesweep import Levels, Window, plane_sweep
 from lfcore.synthesizer import corner_offsets
+from lfcore.tuned_stack import Tuning
 from lfcore.warp import quick_warp
 
 pytestmark = pytest.mark.usefixtures("either_route")
@@ -39,15 +40,16 @@ def test_phases_are_put_together_at_their_places() -> None:
     assert torch.equal(full_size(phases(picture)), picture)
 
 
+@pytest.mark.parametrize("winograd", [False, True])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_the_disparity_is_that_of_the_model(model: CompactModel, dtype: torch.dtype) -> None:
+def test_the_disparity_is_that_of_the_model(model: CompactModel, dtype: torch.dtype, winograd: bool) -> None:
     torch.manual_seed(1)
     luma, offsets, window = torch.rand(4, 1, 40, 44), corner_offsets(0.3, 0.6), Window(13, 27, 13, 31)
     levels = Levels(12, -4.5, 4.5)
     with torch.inference_mode():
         expected = model.disparity(plane_sweep(luma, offsets, levels, window))
         features = plane_sweep(sweep_input(luma), offsets, levels, window).to(dtype)
-        found = CompactInference(model, dtype).disparity(features)
+        found = CompactInference(model, Tuning(dtype, winograd=winograd)).disparity(features)
     assert float(expected.std()) > 0.1
     if dtype == torch.float32:
         torch.testing.assert_close(full_size(found)[None, None], expected, atol=2e-4, rtol=1e-4)
@@ -66,7 +68,7 @@ def test_picture_weights_and_warped_inputs_are_those_of_the_model(model: Compact
     with torch.inference_mode():
         warped = quick_warp(padded, disparity.expand(4, -1, -1, -1), offsets, (REACH, REACH))
         expected = model.colour(warped.view(1, 12, *SIZE), disparity, torch.tensor([[0.2, 0.9]]))[0]
-        networks = CompactInference(model, torch.float32)
+        networks = CompactInference(model, Tuning())
         gathered = networks.warp(networks.prepared(padded), phases(disparity[0, 0]), offsets, REACH, (0.2, 0.9))
         coloured = networks.colour(gathered, (0.2, 0.9), size)
         blended = full_size(coloured.shares()).unsqueeze(1).mul(warped - MIDDLE).sum(0)
@@ -85,7 +87,7 @@ def test_what_the_colour_network_takes_is_the_same_in_bfloat16(model: CompactMod
     found = {}
     with torch.inference_mode():
         for dtype in (torch.float32, torch.bfloat16):
-            networks = CompactInference(model, dtype)
+            networks = CompactInference(model, Tuning(dtype))
             found[dtype] = networks.warp(networks.prepared(padded), disparity, offsets, REACH, (0.8, 0.1)).channels
     assert found[torch.bfloat16].is_contiguous(memory_format=torch.channels_last)
     assert torch.equal(found[torch.float32].bfloat16(), found[torch.bfloat16])
@@ -98,7 +100,7 @@ def test_disparities_that_are_far_away_take_the_edge(model: CompactModel) -> Non
     disparity[:, :4] = -1e30
     disparity[:, 4] = float("nan")  # of which nothing is asked but that the program lives on
     with torch.inference_mode():
-        networks = CompactInference(model, torch.float32)
+        networks = CompactInference(model, Tuning())
         gathered = networks.warp(networks.prepared(padded), disparity, corner_offsets(1, 1), REACH, (1.0, 1.0))
         first = networks.warped_pictures(gathered)[0]
     # The first input's offsets are -1 and -1: far to the right and below in the first rows, left and above in the last.

@@ -28,6 +28,7 @@ from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.synthesis import Synthesis, WeighingSynthesizer, weighs
 from lfcore.synthesizer import MeanSynthesizer
 from lfcore.tone import root_tone
+from lfcore.tuned_stack import Tuning
 
 SIZE = (21, 34)  # odd, so that the networks' phases do not fit
 VIEWPOINT = (0.25, 0.5)
@@ -46,7 +47,7 @@ def summing() -> WeighingSynthesizer:
         for layer in (model.colour.straight, model.colour.residual):
             for parameter in layer.parameters():
                 parameter.zero_()
-    synthesizer = CompactSynthesizer(model.eval(), "key", torch.float32)
+    synthesizer = CompactSynthesizer(model.eval(), "key", Tuning())
     synthesizer.set_light_field(light_field(2, 2, SIZE))
     return synthesizer
 

@@ -24,6 +24,7 @@ from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, learni
 from lfcore.training.loss import LossConfig, StepLoss, cut
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, margin, mixed, sample_group
 from lfcore.training.plot import plot
+from lfcore.tuned_stack import Tuning
 from lfcore.warp import backward_warp
 from lfcore.weights import load_weights
 
@@ -292,7 +293,7 @@ def test_a_teacher_adds_the_distance_to_its_disparity(tmp_path: Path) -> None:
     for patch in range(group.inputs.shape[1]):
         for k, (u, v) in enumerate(CORNERS):
             views[int(v), int(u)] = group.inputs[k, patch].transpose(1, 2, 0)
-        synthesizer = CompactSynthesizer(copy.deepcopy(teacher.model), "teacher", torch.float32)
+        synthesizer = CompactSynthesizer(copy.deepcopy(teacher.model), "teacher", Tuning())
         synthesizer.set_light_field(LightField(views.copy(), "patch", "", ""))
         found = synthesizer.synthesize(group.u, group.v).disparity
         assert found is not None

@@ -6,9 +6,10 @@ import pytest
 import torch
 
 from lfcore import tuning
+from lfcore.layers import DirectConvolution
 from lfcore.tuned_stack import Tuning
 
-CHOICE = Tuning(torch.bfloat16, 208, 32)
+CHOICE = Tuning(torch.bfloat16, 208, 32, winograd=True)
 
 
 @pytest.fixture(autouse=True)
@@ -38,9 +39,10 @@ def test_what_was_measured_is_remembered(measurements: list[Tuning], folder: Pat
     tuning.machine_tuning.cache_clear()  # as a new process begins
     assert tuning.machine_tuning() == CHOICE
     assert len(measurements) == 1
-    by_fourier = Tuning.by_fourier(torch.bfloat16)
-    tuning._remember(by_fourier)
-    assert tuning.remembered() == by_fourier
+    for winograd in (False, True):
+        by_fourier = Tuning.by_fourier(torch.bfloat16, winograd)
+        tuning._remember(by_fourier)
+        assert tuning.remembered() == by_fourier
     assert [path.name for path in folder.iterdir()] == ["tuning.json"]  # nothing else is left behind
     tuning.retune()
     assert len(measurements) == 2
@@ -80,13 +82,14 @@ def test_a_place_that_cannot_be_written_is_no_hindrance(measurements: list[Tunin
 
 
 def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    def choose(short: float, filled: float, narrow: float, fourier: float = 2.0) -> Tuning:
+    def choose(short: float, filled: float, narrow: float, fourier: float = 2.0, winograd: torch.dtype | None = None) -> Tuning:
         def seconds(choice: Tuning) -> float:
             kind = (short if choice.dtype == torch.bfloat16 else 1.0) * (filled if choice.channel_multiple == 16 else 1.0)
             return kind * (narrow if choice.tile_width == 144 else 1.0) * (fourier if choice.fourier else 1.0)
 
         monkeypatch.setattr(tuning, "_probe", lambda choice: lambda: seconds(choice))
-        chosen, sure = tuning.measured(fourier=True)
+        monkeypatch.setattr(tuning, "winograd_gains", lambda dtype: dtype == winograd)
+        chosen, sure = tuning.measured(transforms=True)
         assert sure
         return chosen
 
@@ -97,6 +100,9 @@ def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.Mon
     assert choose(0.9, 1.0, 0.97, 0.95) == Tuning(torch.float32, 272, 1)
     assert choose(0.9, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.float32)
     assert choose(0.5, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.bfloat16)
+    assert choose(0.5, 0.7, 0.6, 0.5, torch.bfloat16) == Tuning.by_fourier(torch.bfloat16, winograd=True)
+    assert choose(0.5, 0.7, 0.6, 0.5, torch.float32) == Tuning.by_fourier(torch.bfloat16)
+    assert choose(0.9, 0.7, 0.6, winograd=torch.float32) == Tuning(torch.float32, 144, 16, winograd=True)
 
 
 def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,10 +114,10 @@ def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytes
 
     monkeypatch.setattr(tuning, "_probe", probe)
     monkeypatch.setattr(tuning, "_BUDGET_SECONDS", 0.0)
-    assert tuning.measured(fourier=False) == (Tuning(torch.bfloat16, 272, 1), False)
+    assert tuning.measured(transforms=False) == (Tuning(torch.bfloat16, 272, 1), False)
     assert timed == [Tuning(torch.float32, 144, 1), Tuning(torch.bfloat16, 144, 1)]
     timed.clear()
-    tuning.measured(fourier=True)
+    tuning.measured(transforms=True)
     assert [(kind.dtype, kind.fourier) for kind in timed] == [
         (dtype, fourier) for fourier in (False, True) for dtype in (torch.float32, torch.bfloat16)
     ]
@@ -127,16 +133,30 @@ def test_it_measures_this_machine_and_leaves_random_numbers_alone() -> None:
     torch.manual_seed(1)
     expected = torch.rand(3)
     torch.manual_seed(1)
-    chosen, _ = tuning.measured(widths=(144, 208), channels=(1,), fourier=False)
+    chosen, _ = tuning.measured(widths=(144, 208), channels=(1,), transforms=False)
     assert chosen.dtype in (torch.float32, torch.bfloat16) and chosen.tile_width in (144, 208)
     assert torch.equal(torch.rand(3), expected)
 
 
 @pytest.mark.usefixtures("compiled_kernels")
-def test_by_fourier_transforms_is_measured_too() -> None:
+def test_by_transforms_is_measured_too() -> None:
     chosen, _ = tuning.measured(widths=(144,), channels=(1,))
-    assert chosen in (
-        *map(Tuning.by_fourier, (torch.float32, torch.bfloat16)),
-        Tuning(torch.float32, 144),
-        Tuning(torch.bfloat16, 144),
+    types = torch.float32, torch.bfloat16
+    directly = [Tuning(dtype, 144, winograd=winograd) for dtype in types for winograd in (False, True)]
+    assert chosen in [*directly, *(Tuning.by_fourier(dtype, winograd) for dtype in types for winograd in (False, True))]
+
+
+def test_winograds_transforms_are_for_where_they_are_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    seconds = {DirectConvolution: 1.0}
+    monkeypatch.setattr(tuning, "can_compute", lambda weight, dtype: dtype == torch.float32)
+    monkeypatch.setattr(tuning, "_seconds", lambda layer, x: seconds.get(type(layer), 0.5))
+    monkeypatch.setattr(
+        tuning, "make_layer", lambda *layer, padding: (_Transformed if layer[3] else DirectConvolution)(*layer[:2])
     )
+    assert tuning.winograd_gains(torch.float32) and not tuning.winograd_gains(torch.bfloat16)
+    seconds[_Transformed] = 0.95  # not worth its lost digits
+    assert not tuning.winograd_gains(torch.float32)
+
+
+class _Transformed(DirectConvolution):
+    """In place of a layer by transforms, which not every machine has."""

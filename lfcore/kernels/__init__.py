@@ -19,6 +19,7 @@ _FUNCTIONS = (
     "fourier_forward",
     "fourier_backward",
     "winograd_convolution",
+    "winograd_halves",
     "compact_disparity",
     "compact_warp",
     "compact_blend",
@@ -26,7 +27,7 @@ _FUNCTIONS = (
 
 FOURIER_LEAST_CHANNELS = 16  # as many as lie in a register
 _FOURIER_FREQUENCIES = 129  # of a tile of 16 x 16 px: what a real picture has, but for 0
-WINOGRAD_LEAST_CHANNELS = 8
+WINOGRAD_LEAST_CHANNELS = 8  # in float32
 WINOGRAD_COLUMNS = 16  # channels out that are computed together
 
 
@@ -140,6 +141,13 @@ def _transform(
     run(*addresses, height, width, channels, *result, step, first, tiles, x.dtype == torch.bfloat16, torch.get_num_threads())
 
 
+def can_convolve(dtype: torch.dtype) -> bool:
+    """Whether `winograd_convolution` takes pictures of this type: bfloat16 needs AVX-512 with its products of pairs."""
+    if _KERNELS is None:
+        return False
+    return dtype == torch.float32 or (dtype == torch.bfloat16 and bool(_KERNELS.winograd_halves()))
+
+
 def winograd_convolution(
     x: Tensor,
     weights: Tensor,
@@ -153,22 +161,26 @@ def winograd_convolution(
 ) -> None:
     """A convolution with 3 x 3 kernels, as lfcore.layers.Layer describes it, from kernels that are transformed already.
 
-    x: (1, C, H, W) float32, channels_last. weights: (36, groups, C, WINOGRAD_COLUMNS) float32, the channels out in groups,
-    filled up with zeros. bias: (O,) float32. plus: like `out`, or None. out: (1, O, H - 2 (dilation - padding), W - ...)
-    float32, channels_last, not x. C and O are at least WINOGRAD_LEAST_CHANNELS.
+    x: (1, C, H, W), channels_last, of a type that `can_convolve`. weights, of the same type: (36, groups, pairs,
+    WINOGRAD_COLUMNS, 2), channels in by pairs, channels out in groups, both filled up with zeros; of each full 32 channels
+    in, the even ones come first, then the odd ones. In float32 (36, groups, C, WINOGRAD_COLUMNS), as they are. bias: (O,)
+    float32. plus: like `out`, or None. out: (1, O, H - 2 (dilation - padding), W - ...), channels_last, not x, of the same
+    type. In float32 C and O are at least WINOGRAD_LEAST_CHANNELS.
     """
-    assert _KERNELS is not None
+    assert _KERNELS is not None and can_convolve(x.dtype)
     (batch, channels, height, width), (_, outputs, *size) = x.shape, out.shape
-    places, groups, inputs, columns = weights.shape
-    assert places == 36 and inputs == channels and columns == WINOGRAD_COLUMNS and 0 <= groups * columns - outputs < columns
-    assert batch == 1 and min(channels, outputs) >= WINOGRAD_LEAST_CHANNELS and bias.shape == (outputs,)
+    halved = x.dtype == torch.bfloat16
+    groups = math.ceil(outputs / WINOGRAD_COLUMNS)
+    kernels = (math.ceil(channels / 2), WINOGRAD_COLUMNS, 2) if halved else (channels, WINOGRAD_COLUMNS)
+    assert weights.shape == (36, groups, *kernels) and weights.is_contiguous() and weights.dtype == x.dtype
+    assert batch == 1 and bias.shape == (outputs,) and (halved or min(channels, outputs) >= WINOGRAD_LEAST_CHANNELS)
     lost = 2 * (dilation - padding)
     assert size == [height - lost, width - lost] and min(size) > 0 and padding >= 0 and dilation >= 1
-    assert x.dtype == torch.float32 and (plus is None or plus.shape == out.shape)
-    _check((x, out) if plus is None else (x, out, plus), (weights, bias))
+    assert plus is None or plus.shape == out.shape
+    _check((x, out) if plus is None else (x, out, plus), (bias,))
     addresses = (*_addresses((x, weights, bias)), 0 if plus is None else plus.data_ptr(), out.data_ptr())
     sizes = (height, width, channels, padding, groups, outputs, *size, dilation)
-    _KERNELS.winograd_convolution(*addresses, *sizes, of_positive, positive, torch.get_num_threads())
+    _KERNELS.winograd_convolution(*addresses, *sizes, of_positive, positive, halved, torch.get_num_threads())
 
 
 def compact_disparity(
