@@ -16,6 +16,7 @@ from torch import Tensor
 
 from lfcore import kernels
 from lfcore.compact import AGREEMENT_REACH
+from lfcore.kernels import PixelMatrix
 from lfcore.neighbourhoods import greatest_around, mean_around
 from lfcore.networks import INPUTS
 from lfcore.tone import TOE, stored_from_root
@@ -89,8 +90,10 @@ class CompiledParts:
     """See Parts: by lfcore.kernels."""
 
     def __init__(self, heads: Heads) -> None:
-        self._score, self._values = _filled(heads)
-        self._spread = _by_neighbour(heads.spread)
+        matrix, bias = heads.score
+        self._score = PixelMatrix.of(matrix.T, bias)
+        self._values = F.pad(heads.values, (0, len(self._score.bias) - len(bias)))
+        self._spread = PixelMatrix.of(*_by_neighbour(heads.spread))
         self._sharpness = heads.sharpness
 
     def prepared(self, corners: Tensor) -> Tensor:
@@ -114,19 +117,11 @@ class CompiledParts:
         return full_size(warped[..., :3].permute(3, 4, 2, 0, 1)) + MIDDLE
 
 
-def _filled(heads: Heads) -> tuple[tuple[Tensor, Tensor], Tensor]:
-    """The matrix of scores (C, P), its bias and the values, filled up to a multiple of 16 by levels that are never chosen."""
-    matrix, bias = heads.score
-    more = -len(bias) % 16
-    return (F.pad(matrix.T, (0, more)).contiguous(), F.pad(bias, (0, more), value=-1e30)), F.pad(heads.values, (0, more))
-
-
 def _by_neighbour(spread: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-    """Matrix (C, 48) and bias, by neighbour, then phase, filled up."""
+    """Matrix (C, 36) and bias, by neighbour, then phase."""
     matrix, bias = spread
     order = torch.arange(len(bias)).view(PHASES, -1).T.flatten()
-    more = -len(bias) % 16
-    return F.pad(matrix[order].T, (0, more)).contiguous(), F.pad(bias[order], (0, more))
+    return matrix[order].T, bias[order]
 
 
 class TorchParts:

@@ -16,7 +16,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.kernels import WINOGRAD_COLUMNS, WINOGRAD_LEAST_CHANNELS, can_convolve, winograd_convolution
+from lfcore.kernels import COLUMNS, WINOGRAD_LEAST_CHANNELS, can_convolve, paired, winograd_convolution
 
 _LEAST_WORTH = 32  # channels out in float32: with fewer, the transforms cost as much as they save
 _POINTS = (-1.5, 0.5, sqrt(0.5)), (6.0, 2.0, sqrt(2.0))  # what a pair's rows are divided by, their squares, they themselves
@@ -35,7 +35,7 @@ class WinogradConvolution:
         self._padding, self._dilation, self._dtype = padding, dilation, dtype
         self._bias = torch.zeros(weight.shape[0]) if bias is None else bias.detach().float().clone()
         matrices = _transformed(weight.detach())
-        self._weights = _by_column(matrices) if dtype == torch.float32 else _by_pair(matrices).to(dtype)
+        self._weights = _grouped(matrices) if dtype == torch.float32 else paired(_evens_first(matrices))
 
     def __call__(self, x: Tensor, *, of_positive: bool = False, plus: Tensor | None = None, positive: bool = False) -> Tensor:
         """See Layer."""
@@ -55,23 +55,21 @@ def can_compute(weight: Tensor, dtype: torch.dtype) -> bool:
 
 
 def _transformed(weight: Tensor) -> Tensor:
-    """Kernels (O, C, 3, 3) to matrices (36, C, O), O filled up to whole groups."""
+    """Kernels (O, C, 3, 3) to matrices (36, C, O) float32."""
     pairs = [[1 / divisor, sign * point / divisor, square / divisor] for divisor, square, point in _POINTS for sign in (1, -1)]
     g = torch.tensor([[1.0, 0.0, 0.0], *pairs, [0.0, 0.0, 1.0]], dtype=torch.float64)
-    matrices = torch.einsum("ia,jb,ocab->ijco", g, g, weight.double()).flatten(0, 1).float()
-    return F.pad(matrices, (0, -matrices.shape[2] % WINOGRAD_COLUMNS))
+    return torch.einsum("ia,jb,ocab->ijco", g, g, weight.double()).flatten(0, 1).float()
 
 
-def _by_column(matrices: Tensor) -> Tensor:
-    """(36, C, O) to (36, groups, C, WINOGRAD_COLUMNS)."""
-    return matrices.unflatten(2, (-1, WINOGRAD_COLUMNS)).transpose(1, 2).contiguous()
+def _grouped(matrices: Tensor) -> Tensor:
+    """(36, C, O) to (36, groups, C, COLUMNS), O filled up to whole groups."""
+    filled = F.pad(matrices, (0, -matrices.shape[2] % COLUMNS))
+    return filled.unflatten(2, (-1, COLUMNS)).transpose(1, 2).contiguous()
 
 
-def _by_pair(matrices: Tensor) -> Tensor:
-    """(36, C, O) to (36, groups, pairs, WINOGRAD_COLUMNS, 2), channels in the order in which the compiled code pairs them."""
+def _evens_first(matrices: Tensor) -> Tensor:
+    """(36, C, O), of each full 32 channels in the even ones first, then the odd ones, as the compiled code has them."""
     channels = matrices.shape[1]
     whole = channels - channels % 32
-    order = torch.arange(whole).view(-1, 16, 2).transpose(1, 2).flatten()  # of 32 the even ones, then the odd ones
-    ordered = matrices[:, torch.cat((order, torch.arange(whole, channels)))]
-    filled = F.pad(ordered, (0, 0, 0, channels % 2))
-    return filled.unflatten(2, (-1, WINOGRAD_COLUMNS)).unflatten(1, (-1, 2)).permute(0, 3, 1, 4, 2).contiguous()
+    order = torch.arange(whole).view(-1, 16, 2).transpose(1, 2).flatten()
+    return matrices[:, torch.cat((order, torch.arange(whole, channels)))]

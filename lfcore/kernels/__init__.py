@@ -8,9 +8,11 @@ on the CPU.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from types import ModuleType
 
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 _FUNCTIONS = (
@@ -19,7 +21,7 @@ _FUNCTIONS = (
     "fourier_forward",
     "fourier_backward",
     "winograd_convolution",
-    "winograd_halves",
+    "halves",
     "compact_disparity",
     "compact_warp",
     "compact_blend",
@@ -28,7 +30,8 @@ _FUNCTIONS = (
 FOURIER_LEAST_CHANNELS = 16  # as many as lie in a register
 _FOURIER_FREQUENCIES = 129  # of a tile of 16 x 16 px: what a real picture has, but for 0
 WINOGRAD_LEAST_CHANNELS = 8  # in float32
-WINOGRAD_COLUMNS = 16  # channels out that are computed together
+COLUMNS = 16  # channels out that are multiplied together
+_NEVER = -1e30  # a score that is never chosen
 
 
 def _compiled() -> ModuleType | None:
@@ -145,7 +148,7 @@ def can_convolve(dtype: torch.dtype) -> bool:
     """Whether `winograd_convolution` takes pictures of this type: bfloat16 needs AVX-512 with its products of pairs."""
     if _KERNELS is None:
         return False
-    return dtype == torch.float32 or (dtype == torch.bfloat16 and bool(_KERNELS.winograd_halves()))
+    return dtype == torch.float32 or (dtype == torch.bfloat16 and bool(_KERNELS.halves()))
 
 
 def winograd_convolution(
@@ -162,16 +165,16 @@ def winograd_convolution(
     """A convolution with 3 x 3 kernels, as lfcore.layers.Layer describes it, from kernels that are transformed already.
 
     x: (1, C, H, W), channels_last, of a type that `can_convolve`. weights, of the same type: (36, groups, pairs,
-    WINOGRAD_COLUMNS, 2), channels in by pairs, channels out in groups, both filled up with zeros; of each full 32 channels
-    in, the even ones come first, then the odd ones. In float32 (36, groups, C, WINOGRAD_COLUMNS), as they are. bias: (O,)
+    COLUMNS, 2), channels in by pairs, channels out in groups, both filled up with zeros; of each full 32 channels
+    in, the even ones come first, then the odd ones. In float32 (36, groups, C, COLUMNS), as they are. bias: (O,)
     float32. plus: like `out`, or None. out: (1, O, H - 2 (dilation - padding), W - ...), channels_last, not x, of the same
     type. In float32 C and O are at least WINOGRAD_LEAST_CHANNELS.
     """
     assert _KERNELS is not None and can_convolve(x.dtype)
     (batch, channels, height, width), (_, outputs, *size) = x.shape, out.shape
     halved = x.dtype == torch.bfloat16
-    groups = math.ceil(outputs / WINOGRAD_COLUMNS)
-    kernels = (math.ceil(channels / 2), WINOGRAD_COLUMNS, 2) if halved else (channels, WINOGRAD_COLUMNS)
+    groups = math.ceil(outputs / COLUMNS)
+    kernels = (math.ceil(channels / 2), COLUMNS, 2) if halved else (channels, COLUMNS)
     assert weights.shape == (36, groups, *kernels) and weights.is_contiguous() and weights.dtype == x.dtype
     assert batch == 1 and bias.shape == (outputs,) and (halved or min(channels, outputs) >= WINOGRAD_LEAST_CHANNELS)
     lost = 2 * (dilation - padding)
@@ -183,31 +186,61 @@ def winograd_convolution(
     _KERNELS.winograd_convolution(*addresses, *sizes, of_positive, positive, halved, torch.get_num_threads())
 
 
+def paired(matrices: Tensor) -> Tensor:
+    """Matrices (N, C, P) as products of bfloat16 take them: (N, groups, pairs, COLUMNS, 2), filled up with zeros."""
+    filled = F.pad(matrices, (0, -matrices.shape[2] % COLUMNS, 0, matrices.shape[1] % 2))
+    return filled.unflatten(2, (-1, COLUMNS)).unflatten(1, (-1, 2)).permute(0, 3, 1, 4, 2).to(torch.bfloat16).contiguous()
+
+
+@dataclass(frozen=True)
+class PixelMatrix:
+    """A matrix by which the channels of pixels are multiplied, and a bias, as `compact_disparity` takes them."""
+
+    weights: Tensor  # (C, P) float32, P a multiple of COLUMNS
+    halved: Tensor | None  # the same, `paired`, where the processor can multiply it
+    bias: Tensor  # (P,) float32
+
+    @classmethod
+    def of(cls, weights: Tensor, bias: Tensor) -> PixelMatrix:
+        """weights: (C, P) and bias: (P,), filled up with columns that are never looked at."""
+        more = -len(bias) % COLUMNS
+        weights, bias = F.pad(weights, (0, more)).contiguous(), F.pad(bias, (0, more), value=_NEVER)
+        can_halve = can_convolve(torch.bfloat16) and weights.shape[0] % 2 == 0
+        return cls(weights, paired(weights.unsqueeze(0)) if can_halve else None, bias)
+
+    def addresses(self, dtype: torch.dtype) -> tuple[int, int, int]:
+        """For pixels of a type."""
+        halved = self.halved if dtype == torch.bfloat16 else None
+        return self.weights.data_ptr(), 0 if halved is None else halved.data_ptr(), self.bias.data_ptr()
+
+
 def compact_disparity(
     pixels: Tensor,
     features: Tensor,
-    score: tuple[Tensor, Tensor],
+    score: PixelMatrix,
     values: Tensor,
-    spread: tuple[Tensor, Tensor],
+    spread: PixelMatrix,
     sharpness: float,
 ) -> Tensor:
     """The last steps of lfcore.compact.CompactDisparity, from its hidden channels to the four phases of the disparity.
 
     pixels: (1, C, h, w), not negative, and features: (1, 2 L, h, w) of the sweep, both channels_last and of one type,
-    bfloat16 or float32. score: matrix (C, P) and bias (P,) float32, where P is a multiple of 16, not less than L; what goes
-    beyond L must have a bias that is never chosen. values: (P,) float32, px. spread: matrix (C, 48) and bias (48,) float32:
-    column 4 k + phase is the score of neighbour k of nine, columns from 36 on do not count. Returns (4, h, w) float32, px.
+    bfloat16 or float32. score: (C, P), P not less than L; what goes beyond L must have a bias that is never chosen. values:
+    (P,) float32, px. spread: (C, 48): column 4 k + phase is the score of neighbour k of nine, columns from 36 on do not
+    count. Returns (4, h, w) float32, px.
     """
     assert _KERNELS is not None
     _, channels, height, width = pixels.shape
     levels, outputs = features.shape[1] // 2, values.numel()
-    assert features.shape == (1, 2 * levels, height, width) and levels <= outputs and outputs % 16 == 0
-    assert score[0].shape == (channels, outputs) and spread[0].shape == (channels, 48)
-    _check((pixels, features), (*score, values, *spread))
+    assert features.shape == (1, 2 * levels, height, width) and levels <= outputs
+    assert score.weights.shape == (channels, outputs) and spread.weights.shape == (channels, 48)
+    _check((pixels, features), (score.weights, score.bias, values, spread.weights, spread.bias))
     coarse, disparity = torch.empty(height, width), torch.empty(4, height, width)
-    parts = (pixels, features, *score, values, *spread, coarse, disparity)
+    dtype = pixels.dtype
+    matrices = (score.addresses(dtype), values.data_ptr(), spread.addresses(dtype))
+    parts = (*_addresses((pixels, features)), *matrices, *_addresses((coarse, disparity)))
     sizes = (height, width, channels, levels, outputs)
-    _KERNELS.compact_disparity(*_addresses(parts), *sizes, sharpness, pixels.dtype == torch.bfloat16, torch.get_num_threads())
+    _KERNELS.compact_disparity(*parts, *sizes, sharpness, dtype == torch.bfloat16, torch.get_num_threads())
     return disparity
 
 

@@ -92,7 +92,7 @@ PyObject *cubic_sample(PyObject *module, PyObject *arguments); /* sample.c */
 PyObject *fourier_forward(PyObject *module, PyObject *arguments); /* fourier.c */
 PyObject *fourier_backward(PyObject *module, PyObject *arguments); /* fourier.c */
 PyObject *winograd_convolution(PyObject *module, PyObject *arguments); /* winograd.c */
-PyObject *winograd_halves(PyObject *module, PyObject *arguments); /* winograd.c */
+PyObject *halves(PyObject *module, PyObject *arguments); /* halved.c */
 PyObject *compact_disparity(PyObject *module, PyObject *arguments); /* compact_disparity.c */
 PyObject *compact_warp(PyObject *module, PyObject *arguments); /* compact_warp.c */
 PyObject *compact_blend(PyObject *module, PyObject *arguments); /* compact_blend.c */

@@ -8,6 +8,8 @@
 
 #include "common.h"
 
+typedef uint16_t EightHalves __attribute__((vector_size(16)));
+
 #define INPUTS 4
 #define PHASES 4
 
@@ -17,6 +19,13 @@ PART void as_floats(const void *source, Py_ssize_t first, Py_ssize_t count, int 
         for (Py_ssize_t i = 0; i < count; ++i) out[i] = float_of((uint32_t)values[i] << 16);
     } else
         memcpy(out, (const float *)source + first, count * sizeof(float));
+}
+
+PART Eight eight_of(const void *source, Py_ssize_t first, int halved) {
+    if (!halved) return eight_at((const float *)source + first);
+    EightHalves halves;
+    memcpy(&halves, (const uint16_t *)source + first, sizeof halves);
+    return (Eight)(__builtin_convertvector(halves, EightWhole) << 16);
 }
 
 PART Four greater(Four a, Four b) {

@@ -1,5 +1,6 @@
 /* The last steps of the disparity network of the small pair: scores of levels to the disparity of every pixel. */
 #include "compact.h"
+#include "halved.h"
 
 #define NEIGHBOURS 9
 #define SPREAD 48 /* four weights for each neighbour, filled up to whole registers */
@@ -33,29 +34,65 @@ PART void four_products(const float *const pixels[4], Py_ssize_t channels, const
     }
 }
 
+/* A matrix and a bias, by which the channels of pixels are multiplied. */
+typedef struct {
+    const float *weights; /* (channels, outputs), outputs a multiple of 16 */
+    const uint16_t *halved; /* the same as `halved_products` wants it, or NULL where that is not to be used */
+    const float *bias; /* (outputs) */
+} Matrix;
+
 typedef struct {
     const void *pixels; /* (height, width, channels), not negative */
     const void *features; /* (height, width, 2 levels): of the sweep, the latter half its deviations */
     int halved;
     Py_ssize_t height, width, channels, levels, outputs; /* outputs: the levels, filled up to a multiple of 16 */
-    const float *score, *score_bias; /* (channels, outputs), (outputs), what is filled up never to be chosen */
+    Matrix score; /* what is filled up is never to be chosen */
     const float *values; /* (outputs), px */
-    const float *spread, *spread_bias; /* (channels, SPREAD), (SPREAD): by neighbour, then phase */
+    Matrix spread; /* its SPREAD outputs by neighbour, then phase */
     float sharpness; /* how steeply a level's score falls with its deviation */
     float *coarse; /* (height, width), px */
     float *disparity; /* (PHASES, height, width), px */
 } Disparity;
 
+/* Of row y: (width, outputs), and room for three pixels more. pixels: room for the channels of the row in float32. */
+PART void row_products(
+    const Disparity *d, Py_ssize_t y, const Matrix *matrix, Py_ssize_t outputs, float *restrict pixels, float *restrict out) {
+    const Py_ssize_t w = d->width, channels = d->channels;
+    if (matrix->halved != NULL) {
+        halved_products((const uint16_t *)d->pixels + y * w * channels, w, channels / 2, matrix->halved, outputs / COLUMNS,
+                        matrix->bias, out);
+        return;
+    }
+    as_floats(d->pixels, y * w * channels, w * channels, d->halved, pixels);
+    for (Py_ssize_t first = 0; first < w; first += 4) {
+        const float *four[4];
+        for (int i = 0; i < 4; ++i) four[i] = pixels + within(first + i, w) * channels;
+        four_products(four, channels, matrix->weights, matrix->bias, outputs, out + first * outputs);
+    }
+}
+
 /* The deviations of row y, summed over the rows around it, at columns from -BOX on: zero beyond the edges. */
-PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict row, float *restrict sums) {
-    const Py_ssize_t w = d->width, outputs = d->outputs;
+PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict sums) {
+    const Py_ssize_t w = d->width, outputs = d->outputs, row = 2 * w * d->levels;
+    const Py_ssize_t begin = at_least(y - BOX, 0), end = at_most(y + BOX + 1, d->height);
     memset(sums, 0, (w + 2 * BOX) * outputs * sizeof(float));
-    for (Py_ssize_t near = at_least(y - BOX, 0); near <= at_most(y + BOX, d->height - 1); ++near)
-        for (Py_ssize_t x = 0; x < w; ++x) {
-            float *restrict here = sums + (x + BOX) * outputs;
-            as_floats(d->features, (near * w + x) * 2 * d->levels + d->levels, d->levels, d->halved, row);
-            for (Py_ssize_t level = 0; level < d->levels; ++level) here[level] += row[level];
+    for (Py_ssize_t x = 0; x < w; ++x) {
+        const Py_ssize_t first = begin * row + (2 * x + 1) * d->levels;
+        float *restrict here = sums + (x + BOX) * outputs;
+        Py_ssize_t level = 0;
+        for (; level + 8 <= d->levels; level += 8) {
+            Eight sum = eight_of(d->features, first + level, d->halved);
+            for (Py_ssize_t near = 1; near < end - begin; ++near)
+                sum += eight_of(d->features, first + level + near * row, d->halved);
+            memcpy(here + level, &sum, sizeof sum);
         }
+        for (; level < d->levels; ++level)
+            for (Py_ssize_t near = 0; near < end - begin; ++near) {
+                float value;
+                as_floats(d->features, first + level + near * row, 1, d->halved, &value);
+                here[level] += value;
+            }
+    }
 }
 
 PART float expected(const float *scores, const float *values, Py_ssize_t outputs) {
@@ -73,23 +110,21 @@ PART float expected(const float *scores, const float *values, Py_ssize_t outputs
 /* Of row y: the mean of the levels, each with a probability from its score. */
 PART void coarse_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, float *restrict sums, float *restrict scores) {
     const Py_ssize_t w = d->width, outputs = d->outputs;
-    sum_rows(d, y, scores, sums);
-    as_floats(d->pixels, y * w * d->channels, w * d->channels, d->halved, pixels);
+    sum_rows(d, y, sums);
+    row_products(d, y, &d->score, outputs, pixels, scores);
     const Py_ssize_t rows = at_most(y + BOX, d->height - 1) - at_least(y - BOX, 0) + 1;
-    for (Py_ssize_t first = 0; first < w; first += 4) {
-        const float *four[4];
-        for (int i = 0; i < 4; ++i) four[i] = pixels + within(first + i, w) * d->channels;
-        four_products(four, d->channels, d->score, d->score_bias, outputs, scores);
-        for (Py_ssize_t x = first; x < at_most(first + 4, w); ++x) {
-            const Py_ssize_t columns = at_most(x + BOX, w - 1) - at_least(x - BOX, 0) + 1;
-            const float weight = d->sharpness / (float)(rows * columns);
-            const float *restrict near = sums + x * outputs;
-            float *restrict own = scores + (x - first) * outputs;
-            for (Py_ssize_t i = 0; i < outputs; ++i)
-                own[i] -= weight * (near[i] + near[i + outputs] + near[i + 2 * outputs] + near[i + 3 * outputs] +
-                                    near[i + 4 * outputs]);
-            d->coarse[y * w + x] = expected(own, d->values, outputs);
+    for (Py_ssize_t x = 0; x < w; ++x) {
+        const Py_ssize_t columns = at_most(x + BOX, w - 1) - at_least(x - BOX, 0) + 1;
+        const float weight = d->sharpness / (float)(rows * columns);
+        const float *restrict near = sums + x * outputs;
+        float *restrict own = scores + x * outputs;
+        for (Py_ssize_t i = 0; i < outputs; i += 8) {
+            Eight sum = eight_at(near + i);
+            for (int k = 1; k <= 2 * BOX; ++k) sum += eight_at(near + k * outputs + i);
+            const Eight score = eight_at(own + i) - weight * sum;
+            memcpy(own + i, &score, sizeof score);
         }
+        d->coarse[y * w + x] = expected(own, d->values, outputs);
     }
 }
 
@@ -97,7 +132,7 @@ PART void coarse_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, f
 PART Four spread_out(const Disparity *d, Py_ssize_t y, Py_ssize_t x, float *restrict scores) {
     Four best = four_at(scores), whole = {0.0f}, sum = {0.0f};
     for (int k = 1; k < NEIGHBOURS; ++k) best = greater(best, four_at(scores + 4 * k));
-    for (int i = 0; i < SPREAD; i += 8) {
+    for (int i = 0; i < 4 * NEIGHBOURS; i += 8) {
         const Eight shares = exponential(eight_at(scores + i) - twice(best));
         memcpy(scores + i, &shares, sizeof shares);
     }
@@ -111,22 +146,17 @@ PART Four spread_out(const Disparity *d, Py_ssize_t y, Py_ssize_t x, float *rest
 
 PART void fine_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, float *restrict scores) {
     const Py_ssize_t w = d->width;
-    as_floats(d->pixels, y * w * d->channels, w * d->channels, d->halved, pixels);
-    for (Py_ssize_t first = 0; first < w; first += 4) {
-        const float *four[4];
-        for (int i = 0; i < 4; ++i) four[i] = pixels + within(first + i, w) * d->channels;
-        four_products(four, d->channels, d->spread, d->spread_bias, SPREAD, scores);
-        for (Py_ssize_t x = first; x < at_most(first + 4, w); ++x) {
-            const Four phases = spread_out(d, y, x, scores + (x - first) * SPREAD);
-            for (int phase = 0; phase < PHASES; ++phase) d->disparity[(phase * d->height + y) * w + x] = phases[phase];
-        }
+    row_products(d, y, &d->spread, SPREAD, pixels, scores);
+    for (Py_ssize_t x = 0; x < w; ++x) {
+        const Four phases = spread_out(d, y, x, scores + x * SPREAD);
+        for (int phase = 0; phase < PHASES; ++phase) d->disparity[(phase * d->height + y) * w + x] = phases[phase];
     }
 }
 
 MANY_PROCESSORS
 static int coarse_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
     const Py_ssize_t pixels = d->width * d->channels, sums = (d->width + 2 * BOX) * d->outputs;
-    float *memory = malloc((pixels + sums + 4 * d->outputs) * sizeof(float));
+    float *memory = malloc((pixels + sums + (d->width + 3) * d->outputs) * sizeof(float));
     if (memory == NULL) return -1;
     for (Py_ssize_t y = begin; y < end; ++y) coarse_row(d, y, memory, memory + pixels, memory + pixels + sums);
     free(memory);
@@ -135,10 +165,11 @@ static int coarse_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
 
 MANY_PROCESSORS
 static int fine_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
-    float scores[4 * SPREAD], *pixels = malloc(d->width * d->channels * sizeof(float));
-    if (pixels == NULL) return -1;
-    for (Py_ssize_t y = begin; y < end; ++y) fine_row(d, y, pixels, scores);
-    free(pixels);
+    const Py_ssize_t pixels = d->width * d->channels;
+    float *memory = malloc((pixels + (d->width + 3) * SPREAD) * sizeof(float));
+    if (memory == NULL) return -1;
+    for (Py_ssize_t y = begin; y < end; ++y) fine_row(d, y, memory, memory + pixels);
+    free(memory);
     return 0;
 }
 
@@ -157,21 +188,23 @@ static int whole_disparity(const Disparity *d, int threads) {
     return failed;
 }
 
+static Matrix matrix_at(const unsigned long long addresses[3]) {
+    return (Matrix){at_address(addresses[0]), at_address(addresses[1]), at_address(addresses[2])};
+}
+
 PyObject *compact_disparity(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Disparity d;
-    unsigned long long pixels, features, score, score_bias, values, spread, spread_bias, coarse, disparity;
+    unsigned long long pixels, features, score[3], values, spread[3], coarse, disparity;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKKKKKnnnnnfpi", &pixels, &features, &score, &score_bias, &values, &spread, &spread_bias,
-                          &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels, &d.outputs, &d.sharpness, &d.halved,
+    if (!PyArg_ParseTuple(arguments, "KK(KKK)K(KKK)KKnnnnnfpi", &pixels, &features, score, score + 1, score + 2, &values,
+                          spread, spread + 1, spread + 2, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels, &d.outputs, &d.sharpness, &d.halved,
                           &threads))
         return NULL;
     d.pixels = at_address(pixels);
     d.features = at_address(features);
-    d.score = at_address(score);
-    d.score_bias = at_address(score_bias);
+    d.score = matrix_at(score);
     d.values = at_address(values);
-    d.spread = at_address(spread);
-    d.spread_bias = at_address(spread_bias);
+    d.spread = matrix_at(spread);
     d.coarse = at_address(coarse);
     d.disparity = at_address(disparity);
     int failed;

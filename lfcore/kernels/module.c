@@ -7,7 +7,7 @@ static PyMethodDef methods[] = {
     {"fourier_forward", fourier_forward, METH_VARARGS, NULL},
     {"fourier_backward", fourier_backward, METH_VARARGS, NULL},
     {"winograd_convolution", winograd_convolution, METH_VARARGS, NULL},
-    {"winograd_halves", winograd_halves, METH_NOARGS, NULL},
+    {"halves", halves, METH_NOARGS, NULL},
     {"compact_disparity", compact_disparity, METH_VARARGS, NULL},
     {"compact_warp", compact_warp, METH_VARARGS, NULL},
     {"compact_blend", compact_blend, METH_VARARGS, NULL},

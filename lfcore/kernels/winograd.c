@@ -144,7 +144,3 @@ PyObject *winograd_convolution(PyObject *Py_UNUSED(module), PyObject *arguments)
     if (failed) return PyErr_NoMemory();
     Py_RETURN_NONE;
 }
-
-PyObject *winograd_halves(PyObject *Py_UNUSED(module), PyObject *Py_UNUSED(arguments)) {
-    return PyBool_FromLong(winograd_takes_halves());
-}

@@ -7,13 +7,13 @@
 #ifndef LFCORE_KERNELS_WINOGRAD_H
 #define LFCORE_KERNELS_WINOGRAD_H
 
+#include "halved.h"
 #include "tiled.h"
 
 #define SIZE 6 /* of a tile, px */
 #define STEP 4 /* of its result */
 #define PLACES (SIZE * SIZE)
 #define TILES 24 /* of a block */
-#define COLUMNS 16 /* outputs in a group of the weights */
 
 typedef struct {
     Tiling tiling; /* of the result */
@@ -60,8 +60,7 @@ typedef struct {
  * same places of a cache. */
 PART Py_ssize_t spaced(Py_ssize_t least) { return 64 * ((least + 63) / 64 | 1); }
 
-/* In winograd_halved.c: whether this processor has what it needs; and the convolution: not 0 where there is no memory. */
-int winograd_takes_halves(void);
+/* In winograd_halved.c, where `takes_halves`. Not 0 where there is no memory. */
 int winograd_in_halves(const Winograd *w, int threads);
 
 #endif

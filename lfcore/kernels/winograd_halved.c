@@ -2,17 +2,11 @@
  * float32; what lies between them is rounded. */
 #include "winograd.h"
 
-#if defined(__x86_64__) && defined(__GNUC__) && (defined(__clang__) || __GNUC__ >= 11)
-#include <immintrin.h>
+#ifdef HALVED_COMPILED
 
 #define LANES 16
 #define ALL 0xFFFF /* lanes */
-#define SUMS 24 /* registers of them, which leaves as many as a product needs of 32 */
 #define AHEAD 1 /* tiles, for which memory is fetched beforehand */
-
-/* Parts become parts of a function for these instructions only if they are for these, too. */
-#define HALVED target("avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,bmi,bmi2")
-#define HALVED_PART static inline __attribute__((always_inline, HALVED))
 
 typedef float Sixteen __attribute__((vector_size(64)));
 
@@ -28,8 +22,6 @@ PART Py_ssize_t inputs_of_a_place(const Winograd *w) { return spaced(TILES * pai
 PART Py_ssize_t products_of_a_tile(const Winograd *w) { return spaced(PLACES * w->groups * COLUMNS * 4) / 4; }
 
 PART uint16_t first_lanes(Py_ssize_t count) { return (uint16_t)((1u << count) - 1); }
-
-HALVED_PART Sixteen none(void) { return (Sixteen)_mm512_setzero_ps(); }
 
 HALVED_PART Sixteen not_negative(Sixteen values) { return (Sixteen)_mm512_max_ps((__m512)values, _mm512_setzero_ps()); }
 
@@ -131,51 +123,6 @@ HALVED_PART void transform(const Winograd *w, Place at, const uint16_t *zeros, u
     if (channel < w->channels) transform_sixteen(w, &tile, channel, first_lanes(w->channels - channel), inputs);
 }
 
-/* Tiles by groups of outputs: the numbers of both are constants. */
-HALVED_PART void multiply_some(
-    const Winograd *w, const uint16_t *restrict inputs, const uint16_t *restrict weights, float *restrict products,
-    const int tiles, const int groups) {
-    const Py_ssize_t count = pairs(w), to_next = products_of_a_tile(w);
-    Sixteen sums[SUMS];
-    for (int i = 0; i < tiles * groups; ++i) sums[i] = none();
-    for (Py_ssize_t pair = 0; pair < count; ++pair) {
-        __m512bh of_group[4];
-        for (int g = 0; g < groups; ++g)
-            of_group[g] = (__m512bh)_mm512_loadu_si512(weights + (g * count + pair) * 2 * COLUMNS);
-        for (int i = 0; i < tiles; ++i) {
-            int32_t both;
-            memcpy(&both, inputs + (i * count + pair) * 2, sizeof both);
-            const __m512bh everywhere = (__m512bh)_mm512_set1_epi32(both);
-            for (int g = 0; g < groups; ++g)
-                sums[i * groups + g] = (Sixteen)_mm512_dpbf16_ps((__m512)sums[i * groups + g], everywhere, of_group[g]);
-        }
-    }
-    for (int i = 0; i < tiles; ++i)
-        for (int g = 0; g < groups; ++g)
-            _mm512_storeu_ps(products + i * to_next + g * COLUMNS, (__m512)sums[i * groups + g]);
-}
-
-/* `most` tiles at once, with as many sums as there are registers for; the last ones may be tiles that nobody has set. */
-#define MULTIPLY_ALL(most, groups)                                                                                             \
-    for (Py_ssize_t tile = 0; tile < tiles; tile += (most))                                                                    \
-    multiply_some(w, inputs + tile * row, of_groups, own + tile * products_of_a_tile(w), most, groups)
-
-HALVED_PART void multiply(
-    const Winograd *w, Py_ssize_t tiles, const uint16_t *restrict inputs, const uint16_t *restrict weights,
-    float *restrict products) {
-    const Py_ssize_t row = 2 * pairs(w);
-    for (Py_ssize_t group = 0; group < w->groups; group += 4) {
-        const uint16_t *of_groups = weights + group * row * COLUMNS;
-        float *own = products + group * COLUMNS;
-        switch (w->groups - group) {
-        case 1: MULTIPLY_ALL(12, 1); break; /* of more tiles, their places would not fit into registers */
-        case 2: MULTIPLY_ALL(12, 2); break;
-        case 3: MULTIPLY_ALL(8, 3); break;
-        default: MULTIPLY_ALL(6, 4);
-        }
-    }
-}
-
 HALVED_PART void transform_back(
     const Winograd *w, Place at, Py_ssize_t channel, uint16_t counting, const float *restrict products) {
     Sixteen work[STEP][SIZE], lane[SIZE];
@@ -211,8 +158,8 @@ __attribute__((HALVED)) static void convolve_block(
     }
     const Py_ssize_t weights = w->groups * COLUMNS * 2 * pairs(w);
     for (int place = 0; place < PLACES; ++place)
-        multiply(w, tiles, inputs + place * inputs_of_a_place(w), (const uint16_t *)w->weights + place * weights,
-                 products + place * w->groups * COLUMNS);
+        all_products(inputs + place * inputs_of_a_place(w), tiles, pairs(w), (const uint16_t *)w->weights + place * weights,
+                     w->groups, NULL, products + place * w->groups * COLUMNS, products_of_a_tile(w));
     for (Py_ssize_t tile = 0; tile < tiles; ++tile) {
         if (tile + AHEAD < tiles) fetch_result(w, places[tile + AHEAD]);
         const float *own = products + tile * products_of_a_tile(w);
@@ -222,18 +169,13 @@ __attribute__((HALVED)) static void convolve_block(
     }
 }
 
-int winograd_takes_halves(void) {
-    return __builtin_cpu_supports("avx512bf16") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl") &&
-           __builtin_cpu_supports("avx512dq");
-}
-
 int winograd_in_halves(const Winograd *w, int threads) {
     const Py_ssize_t tiles = tile_count(&w->tiling);
     uint16_t *zeros = calloc(2 * pairs(w), sizeof(uint16_t));
     int failed = zeros == NULL;
 #pragma omp parallel num_threads(threads) reduction(| : failed)
     {
-        /* Zeros, for some tiles and the second of a last pair are set by nobody. */
+        /* Zeros, for the second of a last pair is set by nobody. */
         uint16_t *inputs = calloc(PLACES * inputs_of_a_place(w), sizeof(uint16_t));
         float *products = malloc(TILES * products_of_a_tile(w) * sizeof(float));
         failed |= inputs == NULL || products == NULL;
@@ -249,7 +191,6 @@ int winograd_in_halves(const Winograd *w, int threads) {
 
 #else
 
-int winograd_takes_halves(void) { return 0; }
 int winograd_in_halves(const Winograd *Py_UNUSED(w), int Py_UNUSED(threads)) { return 0; }
 
 #endif
