@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from lfcore.compact import CompactModel, ResidualBlock, log_nearness
-from lfcore.compact_parts import MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
+from lfcore.compact_parts import LOGITS, MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
 from lfcore.layers import Layer, make_layer
 from lfcore.tuned_stack import Tuning
 
@@ -63,7 +63,8 @@ class CompactInference:
             self._colour_stem = self._layer(colour.stem, x_scale, order)
             self._straight = self._layer(colour.straight, x_scale, order, _by_phase(3))
             self._colour_blocks = self._block_layers(colour.blocks)
-            self._weights, self._residual = self._layer(colour.weights), self._layer(colour.residual, outputs=_by_phase(3))
+            both = torch.cat((torch.arange(LOGITS), LOGITS + _by_phase(3)))
+            self._outputs = self._layer(_joined(colour.weights, colour.residual), outputs=both)
             self._nearness = float(colour.nearness)
 
     def _layer(
@@ -105,11 +106,10 @@ class CompactInference:
     def colour(self, gathered: Gathered, position: tuple[float, float], size: tuple[int, int]) -> Coloured:
         """The picture, (height, width) = `size`, of the warped inputs at (u, v)."""
         x = gathered.channels
-        hidden = _residuals(self._colour_stem(x), self._colour_blocks).relu_()
-        logits = self._weights(hidden)
+        outputs = self._outputs(_residuals(self._colour_stem(x), self._colour_blocks), of_positive=True)
         nearness = self._nearness * log_nearness(torch.tensor([position])).flatten()
-        image = self._parts.blended((logits, self._residual(hidden), self._straight(x)), gathered.warped, nearness, size)
-        return Coloured(image, logits, nearness)
+        image = self._parts.blended(outputs, self._straight(x), gathered.warped, nearness, size)
+        return Coloured(image, outputs[:, :LOGITS], nearness)
 
     def warped_pictures(self, gathered: Gathered) -> Tensor:
         """The warped inputs at full size, (4, 3, 2 h, 2 w), in the root tone."""
@@ -119,6 +119,16 @@ class CompactInference:
 def _by_phase(channels: int) -> Tensor:
     """The order of a pixel shuffle's channels, by channel, then phase, as one by phase, then channel."""
     return torch.arange(PHASES * channels).view(channels, PHASES).T.flatten()
+
+
+def _joined(first: nn.Conv2d, second: nn.Conv2d) -> nn.Conv2d:
+    """Both as one, whose outputs are those of one and then of the other."""
+    outputs, (height, width) = first.out_channels + second.out_channels, first.kernel_size
+    joined = nn.utils.skip_init(nn.Conv2d, first.in_channels, outputs, (height, width), padding=first.padding)
+    assert joined.bias is not None and first.bias is not None and second.bias is not None
+    joined.weight.copy_(torch.cat((first.weight, second.weight)))
+    joined.bias.copy_(torch.cat((first.bias, second.bias)))
+    return joined
 
 
 def _matrix(convolution: nn.Conv2d) -> tuple[Tensor, Tensor]:

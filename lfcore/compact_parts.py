@@ -25,6 +25,7 @@ from lfcore.warp import QUICK_A, quick_sample
 MIDDLE = 0.5  # is taken off toned pictures before they are warped, since the colour network wants them around 0
 RESIDUAL = 0.1  # what the colour network's residual counts
 PHASES = 4
+LOGITS = INPUTS * PHASES  # scores of the inputs
 GATHERED = 64  # channels that the colour network takes
 
 
@@ -60,11 +61,10 @@ class Parts(Protocol):
     ) -> Gathered:
         """The corners warped by the phases of the disparity; offsets: (4, 2), p_i - q; position: as the network takes it."""
 
-    def blended(
-        self, outputs: tuple[Tensor, Tensor, Tensor], warped: Tensor, nearness: Tensor, size: tuple[int, int]
-    ) -> Tensor:
-        """The picture (*size, 3), stored values within 0 and 1. outputs: scores of the inputs (1, 16, h, w) by input, then
-        phase, and two residuals (1, 12, h, w) by phase, then channel. nearness: (4,), added to the scores."""
+    def blended(self, outputs: Tensor, straight: Tensor, warped: Tensor, nearness: Tensor, size: tuple[int, int]) -> Tensor:
+        """The picture (*size, 3), stored values within 0 and 1. outputs: (1, 28, h, w), LOGITS scores of the inputs by input,
+        then phase, and a residual by phase, then channel; straight: (1, 12, h, w), added to it. nearness: (4,), added to the
+        scores."""
 
     def pictures(self, warped: Tensor) -> Tensor:
         """The warped inputs of a Gathered at full size, (4, 3, 2 h, 2 w), in the root tone."""
@@ -108,10 +108,8 @@ class CompiledParts:
     ) -> Gathered:
         return Gathered(*kernels.compact_warp(corners, disparity, offsets, reach, QUICK_A, position, dtype))
 
-    def blended(
-        self, outputs: tuple[Tensor, Tensor, Tensor], warped: Tensor, nearness: Tensor, size: tuple[int, int]
-    ) -> Tensor:
-        return kernels.compact_blend(outputs, warped, nearness, size, (MIDDLE, RESIDUAL, TOE))
+    def blended(self, outputs: Tensor, straight: Tensor, warped: Tensor, nearness: Tensor, size: tuple[int, int]) -> Tensor:
+        return kernels.compact_blend(outputs, straight, warped, nearness, size, (MIDDLE, RESIDUAL, TOE))
 
     def pictures(self, warped: Tensor) -> Tensor:
         return full_size(warped[..., :3].permute(3, 4, 2, 0, 1)) + MIDDLE
@@ -163,12 +161,9 @@ class TorchParts:
         channels[0, 63] = greatest_around(disparity.amax(0), 1) + greatest_around(-disparity.amin(0), 1)
         return Gathered(channels.contiguous(memory_format=torch.channels_last), warped)
 
-    def blended(
-        self, outputs: tuple[Tensor, Tensor, Tensor], warped: Tensor, nearness: Tensor, size: tuple[int, int]
-    ) -> Tensor:
-        logits, residual, straight = outputs
-        shares = input_shares(logits, nearness)  # (4, 4, h, w)
-        added = planes(residual + straight).view(PHASES, 3, *shares.shape[2:]).transpose(0, 1)  # (3, 4, h, w)
+    def blended(self, outputs: Tensor, straight: Tensor, warped: Tensor, nearness: Tensor, size: tuple[int, int]) -> Tensor:
+        shares = input_shares(outputs[:, :LOGITS], nearness)  # (4, 4, h, w)
+        added = planes(outputs[:, LOGITS:] + straight).view(PHASES, 3, *shares.shape[2:]).transpose(0, 1)  # (3, 4, h, w)
         toned = added.mul_(RESIDUAL).add_(MIDDLE)
         for share, part in zip(shares, warped, strict=True):
             toned.addcmul_(share, part)

@@ -259,18 +259,19 @@ def compact_warp(
     _, height, width = disparity.shape
     assert corners.shape[0] == corners.shape[3] == 4 and min(corners.shape[1:3]) >= 4 and reach >= 2
     assert disparity.shape[0] == 4 and offsets.shape == (4, 2)
-    offsets = offsets.contiguous()
-    _check((), (corners, disparity, offsets))
+    along_axes = offsets.T.contiguous()
+    _check((), (corners, disparity, along_axes))
     gathered = torch.empty(1, 64, height, width, dtype=dtype, memory_format=torch.channels_last)
     warped = torch.empty(height, width, 4, 4, 4)
     sizes = (*corners.shape[1:3], height, width, reach)
-    parts = _addresses((corners, disparity, offsets, gathered, warped))
+    parts = _addresses((corners, disparity, along_axes, gathered, warped))
     _KERNELS.compact_warp(*parts, *sizes, a, *position, dtype == torch.bfloat16, torch.get_num_threads())
     return gathered, warped
 
 
 def compact_blend(
-    outputs: tuple[Tensor, Tensor, Tensor],
+    outputs: Tensor,
+    straight: Tensor,
     warped: Tensor,
     nearness: Tensor,
     size: tuple[int, int],
@@ -278,22 +279,21 @@ def compact_blend(
 ) -> Tensor:
     """The last steps of lfcore.compact.CompactColour: the warped inputs, each with its weight, and the residual.
 
-    outputs: what comes out of the layers, all (1, ., h, w) channels_last, of one type, bfloat16 or float32: 16 scores by
-    input, then phase, and twice 12 channels of the residual by phase, then channel, which are added up. warped: as
-    `compact_warp` returns it. nearness: (4,) float32, added to the inputs' scores. size: of the picture, at most (2 h, 2 w).
+    outputs: (1, 28, h, w) and straight: (1, 12, h, w), channels_last, of one type, bfloat16 or float32: 16 scores by input,
+    then phase, and 12 channels of the residual by phase, then channel, to which `straight` is added. warped: as `compact_warp`
+    returns it. nearness: (4,) float32, added to the inputs' scores. size: of the picture, at most (2 h, 2 w).
     scales: what was taken off the warped inputs, what the residual counts, and the toe of the root tone. Returns (height,
     width, 3) float32, stored values.
     """
     assert _KERNELS is not None
-    logits, residual, straight = outputs
-    _, _, height, width = logits.shape
-    assert logits.shape[1] == 16 and residual.shape == straight.shape == (1, 12, height, width)
+    _, _, height, width = outputs.shape
+    assert outputs.shape[1] == 28 and straight.shape == (1, 12, height, width)
     assert warped.shape == (height, width, 4, 4, 4) and nearness.shape == (4,)
     assert size[0] <= 2 * height and size[1] <= 2 * width
-    _check(outputs, (warped, nearness))
+    _check((outputs, straight), (warped, nearness))
     picture = torch.empty(*size, 3)
-    parts = _addresses((*outputs, warped, nearness, picture))
-    _KERNELS.compact_blend(*parts, height, width, *size, *scales, logits.dtype == torch.bfloat16, torch.get_num_threads())
+    parts = _addresses((outputs, straight, warped, nearness, picture))
+    _KERNELS.compact_blend(*parts, height, width, *size, *scales, outputs.dtype == torch.bfloat16, torch.get_num_threads())
     return picture
 
 

@@ -78,6 +78,15 @@ PART Four cubic_taps(float t, float a) {
     return ((third * distance + second) * distance + first) * distance + none;
 }
 
+/* The same for four places at once: weight k of each of them. */
+PART void cubic_taps_of_four(Four t, float a, Four taps[4]) {
+    const Four outer[2] = {1.0f + t, 2.0f - t}, inner[2] = {t, 1.0f - t};
+    for (int side = 0; side < 2; ++side) {
+        taps[3 * side] = ((a * outer[side] - 5.0f * a) * outer[side] + 8.0f * a) * outer[side] - 4.0f * a;
+        taps[1 + side] = ((a + 2.0f) * inner[side] - (a + 3.0f)) * inner[side] * inner[side] + 1.0f;
+    }
+}
+
 PART int32_t whole_below(float place) {
     const int32_t towards_zero = (int32_t)place;
     return towards_zero - ((float)towards_zero > place);

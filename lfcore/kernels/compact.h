@@ -8,6 +8,7 @@
 
 #include "common.h"
 
+typedef int32_t FourWhole __attribute__((vector_size(16)));
 typedef uint16_t EightHalves __attribute__((vector_size(16)));
 
 #define INPUTS 4

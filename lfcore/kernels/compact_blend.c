@@ -1,9 +1,12 @@
 /* The last steps of the colour network of the small pair: weights of the inputs and a residual to the picture. */
 #include "compact.h"
 
+#define LOGITS (INPUTS * PHASES)
+#define OUTPUTS (LOGITS + 3 * PHASES)
+
 typedef struct {
-    const void *logits; /* (height, width, INPUTS, PHASES) */
-    const void *residual, *straight; /* (height, width, PHASES, 3) */
+    const void *outputs; /* (height, width, OUTPUTS): logits by input and phase, then the residual by phase and channel */
+    const void *straight; /* (height, width, 3 * PHASES): more of the residual */
     int halved;
     const float *warped; /* (height, width, PHASES, INPUTS, 4) */
     const float *nearness; /* (INPUTS): added to the logits */
@@ -21,11 +24,11 @@ PART float stored(float toned, float toe) {
 
 PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const float *nearness) {
     const Py_ssize_t pixel = y * b->width + x;
-    float scores[INPUTS * PHASES], residual[3 * PHASES + 1], straight[3 * PHASES + 1]; /* three channels are read as four */
-    as_floats(b->logits, pixel * INPUTS * PHASES, INPUTS * PHASES, b->halved, scores);
-    as_floats(b->residual, pixel * 3 * PHASES, 3 * PHASES, b->halved, residual);
+    float scores[OUTPUTS + 1], straight[3 * PHASES + 1]; /* three channels are read as four */
+    const float *residual = scores + LOGITS;
+    as_floats(b->outputs, pixel * OUTPUTS, OUTPUTS, b->halved, scores);
     as_floats(b->straight, pixel * 3 * PHASES, 3 * PHASES, b->halved, straight);
-    residual[3 * PHASES] = straight[3 * PHASES] = 0.0f;
+    scores[OUTPUTS] = straight[3 * PHASES] = 0.0f;
     const Eight low = eight_at(scores) + eight_at(nearness), high = eight_at(scores + 8) + eight_at(nearness + 8);
     const Eight best = greater_of_eight(low, high);
     const Four greatest = greater(first_half(best), second_half(best));
@@ -47,8 +50,8 @@ PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const float *n
 
 MANY_PROCESSORS
 static void blend_rows(const Blend *b, Py_ssize_t begin, Py_ssize_t end) {
-    float nearness[INPUTS * PHASES];
-    for (int i = 0; i < INPUTS * PHASES; ++i) nearness[i] = b->nearness[i / PHASES];
+    float nearness[LOGITS];
+    for (int i = 0; i < LOGITS; ++i) nearness[i] = b->nearness[i / PHASES];
     for (Py_ssize_t y = begin; y < end; ++y)
         for (Py_ssize_t x = 0; x < b->width; ++x) blend_pixel(b, y, x, nearness);
 }
@@ -62,13 +65,12 @@ static void whole_blend(const Blend *b, int threads) {
 
 PyObject *compact_blend(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Blend b;
-    unsigned long long logits, residual, straight, warped, nearness, picture;
+    unsigned long long outputs, straight, warped, nearness, picture;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKKnnnnfffpi", &logits, &residual, &straight, &warped, &nearness, &picture, &b.height,
-                          &b.width, &b.picture_height, &b.picture_width, &b.middle, &b.weight, &b.toe, &b.halved, &threads))
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnfffpi", &outputs, &straight, &warped, &nearness, &picture, &b.height, &b.width,
+                          &b.picture_height, &b.picture_width, &b.middle, &b.weight, &b.toe, &b.halved, &threads))
         return NULL;
-    b.logits = at_address(logits);
-    b.residual = at_address(residual);
+    b.outputs = at_address(outputs);
     b.straight = at_address(straight);
     b.warped = at_address(warped);
     b.nearness = at_address(nearness);

@@ -197,8 +197,8 @@ PyObject *compact_disparity(PyObject *Py_UNUSED(module), PyObject *arguments) {
     unsigned long long pixels, features, score[3], values, spread[3], coarse, disparity;
     int threads;
     if (!PyArg_ParseTuple(arguments, "KK(KKK)K(KKK)KKnnnnnfpi", &pixels, &features, score, score + 1, score + 2, &values,
-                          spread, spread + 1, spread + 2, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels, &d.outputs, &d.sharpness, &d.halved,
-                          &threads))
+                          spread, spread + 1, spread + 2, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels,
+                          &d.outputs, &d.sharpness, &d.halved, &threads))
         return NULL;
     d.pixels = at_address(pixels);
     d.features = at_address(features);

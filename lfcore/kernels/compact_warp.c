@@ -15,7 +15,7 @@ typedef struct {
     const float *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
     Py_ssize_t source_height, source_width;
     const float *disparity; /* (PHASES, height, width), px */
-    const float *offsets; /* (INPUTS, 2): what a pixel of disparity moves the place of sampling by, along x and y */
+    const float *offsets; /* (2, INPUTS): what a pixel of disparity moves the place of sampling by, along x, then y */
     Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
     float a; /* of the cubic kernel */
     float u, v; /* as the colour network takes them */
@@ -24,25 +24,38 @@ typedef struct {
     float *warped; /* (height, width, PHASES, INPUTS, 4) */
 } Warp;
 
+/* Along an axis, where the inputs are sampled: the first pixel of four, and what each counts. */
+typedef struct {
+    FourWhole first;
+    Four taps[4]; /* each of all inputs */
+} Places;
+
 /* Places nearer than a pixel to the edge, or not numbers, are moved there: the corners are continued by more than that. */
-PART float inner_place(float place, Py_ssize_t size) {
-    const float bounded = place > 1.0f ? place : 1.0f, last = (float)(size - 3);
-    return bounded < last ? bounded : last;
+PART Places inner_places(Four places, Py_ssize_t size, float a) {
+    const Four least = {1.0f, 1.0f, 1.0f, 1.0f}, last = (float)(size - 3) * least;
+    const FourWhole above = places > least;
+    const Four bounded = (Four)(((FourWhole)places & above) | ((FourWhole)least & ~above));
+    const FourWhole below = bounded < last;
+    const Four inner = (Four)(((FourWhole)bounded & below) | ((FourWhole)last & ~below));
+    const FourWhole whole = __builtin_convertvector(inner, FourWhole);
+    Places found = {.first = whole - 1};
+    cubic_taps_of_four(inner - __builtin_convertvector(whole, Four), a, found.taps);
+    return found;
 }
 
-PART Four sample_colours(const float *corner, Py_ssize_t height, Py_ssize_t width, float x, float y, float a) {
-    const float near_x = inner_place(x, width), near_y = inner_place(y, height);
-    const Py_ssize_t whole_x = (int32_t)near_x, whole_y = (int32_t)near_y;
-    const Four across = cubic_taps(near_x - (float)whole_x, a), down = cubic_taps(near_y - (float)whole_y, a);
-    const float *place = corner + 4 * ((whole_y - 1) * width + whole_x - 1);
+PART Four sample_colours(const Warp *warp, int input, const Places *across, const Places *down) {
+    const Py_ssize_t width = warp->source_width;
+    const float *place = warp->corners + 4 * ((input * warp->source_height + down->first[input]) * width + across->first[input]);
     Four columns[4];
     for (int half = 0; half < 2; ++half) {
         const float *two = place + 8 * half;
-        const Eight sum = down[0] * eight_at(two) + down[1] * eight_at(two + 4 * width) + down[2] * eight_at(two + 8 * width) +
-                          down[3] * eight_at(two + 12 * width);
+        Eight sum = down->taps[0][input] * eight_at(two);
+        for (int k = 1; k < 4; ++k) sum += down->taps[k][input] * eight_at(two + 4 * k * width);
         memcpy(columns + 2 * half, &sum, sizeof sum);
     }
-    return across[0] * columns[0] + across[1] * columns[1] + across[2] * columns[2] + across[3] * columns[3];
+    Four colours = across->taps[0][input] * columns[0];
+    for (int k = 1; k < 4; ++k) colours += across->taps[k][input] * columns[k];
+    return colours;
 }
 
 /* The least or greatest (with its sign turned) disparity of the three rows around y, by column. */
@@ -63,7 +76,8 @@ PART float widest_around(const float *widest, Py_ssize_t x, Py_ssize_t width) {
 }
 
 PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict greatest, float *restrict least) {
-    const Py_ssize_t w = warp->width, source = 4 * warp->source_height * warp->source_width;
+    const Py_ssize_t w = warp->width;
+    const Four offsets_x = four_at(warp->offsets), offsets_y = four_at(warp->offsets + INPUTS);
     widest_of_rows(warp, y, 1.0f, greatest);
     widest_of_rows(warp, y, -1.0f, least);
     for (Py_ssize_t x = 0; x < w; ++x) {
@@ -75,10 +89,10 @@ PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict greatest, flo
             const float column = (float)(2 * x + phase % 2 + warp->reach), row = (float)(2 * y + phase / 2 + warp->reach);
             Four samples[INPUTS], mean = {0.0f};
             total += disparity;
+            const Places across = inner_places(column + offsets_x * disparity, warp->source_width, warp->a);
+            const Places down = inner_places(row + offsets_y * disparity, warp->source_height, warp->a);
             for (int n = 0; n < INPUTS; ++n) {
-                samples[n] = sample_colours(warp->corners + n * source, warp->source_height, warp->source_width,
-                                            column + warp->offsets[2 * n] * disparity,
-                                            row + warp->offsets[2 * n + 1] * disparity, warp->a);
+                samples[n] = sample_colours(warp, n, &across, &down);
                 mean += samples[n];
             }
             memcpy(warped + phase * INPUTS * 4, samples, sizeof samples);

@@ -25,8 +25,9 @@ void halved_products(const uint16_t *rows, Py_ssize_t count, Py_ssize_t pairs, c
 #define SUMS 24 /* registers of them, which leaves as many as a product needs of 32 */
 
 /* Numbers of rows and of groups that are constants. bias: NULL for none. to_next: floats from one row of `out` to the next. */
-HALVED_PART void some_products(const uint16_t *restrict rows, Py_ssize_t pairs, const uint16_t *restrict matrix, const float *bias,
-                               float *restrict out, Py_ssize_t to_next, const int count, const int groups) {
+HALVED_PART void some_products(
+    const uint16_t *restrict rows, Py_ssize_t pairs, const uint16_t *restrict matrix, const float *bias, float *restrict out,
+    Py_ssize_t to_next, const int count, const int groups) {
     __m512 sums[SUMS];
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < groups; ++g)
@@ -57,8 +58,9 @@ HALVED_PART void some_products(const uint16_t *restrict rows, Py_ssize_t pairs, 
             ++row;                                                                                                             \
         }
 
-HALVED_PART void all_products(const uint16_t *restrict rows, Py_ssize_t count, Py_ssize_t pairs, const uint16_t *restrict matrix,
-                              Py_ssize_t groups, const float *bias, float *restrict out, Py_ssize_t to_next) {
+HALVED_PART void all_products(
+    const uint16_t *restrict rows, Py_ssize_t count, Py_ssize_t pairs, const uint16_t *restrict matrix, Py_ssize_t groups,
+    const float *bias, float *restrict out, Py_ssize_t to_next) {
     for (Py_ssize_t group = 0; group < groups; group += 4) {
         const uint16_t *own = matrix + group * pairs * 2 * COLUMNS;
         const float *own_bias = bias == NULL ? NULL : bias + group * COLUMNS;

@@ -17,7 +17,7 @@ typedef struct {
 /* Channels are multiplied in pairs; of an odd number the last pair's second is 0. */
 PART Py_ssize_t pairs(const Winograd *w) { return (w->channels + 1) / 2; }
 
-/* Inputs are (PLACES, TILES, pairs, 2), products (TILES, PLACES, groups * COLUMNS). Values from one of the first to the next: */
+/* Inputs are (PLACES, TILES, pairs, 2), products (TILES, PLACES, groups * COLUMNS). Values from one to the next: */
 PART Py_ssize_t inputs_of_a_place(const Winograd *w) { return spaced(TILES * pairs(w) * 4) / 2; }
 PART Py_ssize_t products_of_a_tile(const Winograd *w) { return spaced(PLACES * w->groups * COLUMNS * 4) / 4; }
 
