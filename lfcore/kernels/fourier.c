@@ -6,6 +6,7 @@
 
 #define LANES 16
 #define SIZE 16 /* of a tile, px */
+#define TILES_OF_A_THREAD 4 /* that it does one after the other, since each has memory fetched for the next */
 
 /* As wide as the widest registers, which plain arithmetic gains from. */
 typedef float Sixteen __attribute__((vector_size(4 * LANES)));
@@ -92,13 +93,14 @@ PART void real_sixteen(Sixteen *x) {
  * numbers. What is left is the sum of all pixels, kept by itself. */
 #define FIRST_EDGE (7 * SIZE)
 #define LAST_EDGE (FIRST_EDGE + 8)
+#define FREQUENCIES (LAST_EDGE + 9)
 
 typedef struct {
     Tiling tiling; /* of the result */
     void *pixels; /* (height, width, channels): what is convolved, or the result, which is rectified */
     int halved; /* whether pixels and spectra are bfloat16; else float32 */
     Py_ssize_t height, width, channels;
-    void *spectra; /* (129, tiles, 2 channels): real, then imaginary parts */
+    void *spectra; /* (FREQUENCIES, tiles, 2 channels): real, then imaginary parts */
     float *sums; /* (tiles, channels): frequency 0, which is large, and in bfloat16 would lose most */
     const float *bias; /* (channels); backward only */
     Py_ssize_t first, tiles; /* of the tiles */
@@ -206,20 +208,44 @@ PART void backward_channels(const Fourier *f, Py_ssize_t tile, Place at, Py_ssiz
     }
 }
 
+/* Has a tile's spectra fetched, if not as near as what is in use: processors do not foresee so many places. */
+PART void fetch_spectra(const Fourier *f, Py_ssize_t tile) {
+    const Py_ssize_t size = f->halved ? 2 : 4, bytes = 2 * f->channels * size;
+    for (Py_ssize_t frequency = 0; frequency < FREQUENCIES; ++frequency) {
+        const char *spectrum = (const char *)f->spectra + spectrum_place(f, frequency, tile) * size;
+        for (Py_ssize_t byte = 0; byte < bytes; byte += 64) __builtin_prefetch(spectrum + byte, 1, 2);
+    }
+}
+
+/* Has those pixels fetched that the tile to the left does not have. */
+PART void fetch_pixels(const Fourier *f, Place at) {
+    const Py_ssize_t bytes = f->channels * (f->halved ? 2 : 4);
+    for (Py_ssize_t y = at.top; y < at_most(at.top + SIZE, f->height); ++y)
+        for (Py_ssize_t x = at.left + SIZE - f->tiling.step; x < at_most(at.left + SIZE, f->width); ++x) {
+            const char *pixel = (const char *)f->pixels + (y * f->width + x) * bytes;
+            for (Py_ssize_t byte = 0; byte < bytes; byte += 64) __builtin_prefetch(pixel + byte);
+        }
+}
+
 MANY_PROCESSORS
 static void forward(const Fourier *f, Py_ssize_t tile) {
     const Place at = tile_place(&f->tiling, f->first + tile);
+    if (tile + 1 < f->tiles) {
+        fetch_spectra(f, tile + 1);
+        fetch_pixels(f, tile_place(&f->tiling, f->first + tile + 1));
+    }
     EACH_GROUP(channel, f->channels, LANES) forward_channels(f, tile, at, channel);
 }
 
 MANY_PROCESSORS
 static void backward(const Fourier *f, Py_ssize_t tile) {
     const Place at = tile_place(&f->tiling, f->first + tile);
+    if (tile + 1 < f->tiles) fetch_spectra(f, tile + 1);
     EACH_GROUP(channel, f->channels, LANES) backward_channels(f, tile, at, channel);
 }
 
 static void all_tiles(const Fourier *f, void (*step)(const Fourier *, Py_ssize_t), int threads) {
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
+#pragma omp parallel for num_threads(threads) schedule(dynamic, TILES_OF_A_THREAD)
     for (Py_ssize_t tile = 0; tile < f->tiles; ++tile) step(f, tile);
 }
 
