@@ -39,7 +39,7 @@ from lfcore.errors import LfviewError
 from lfcore.lightfield import LightField
 from lfcore.sweep_plan import is_plan_file
 
-REST_SECONDS = 0.1  # the hand counts as resting when the viewpoint has not moved for so long
+REST_SECONDS = 0.08  # the hand counts as resting when the viewpoint has not moved for so long
 QUIET_SECONDS = 0.6  # after the last thing that the person did, views are computed ahead
 # A dragged viewpoint that comes to rest this near to a captured or a cached one goes there: no pixel of an ordinary light
 # field moves visibly by it, and the camera's view or the finished picture is there at once.

@@ -10,6 +10,7 @@ products torch's.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import torch
 from torch import Tensor, nn
@@ -20,6 +21,10 @@ SIZE = 16  # px of a tile
 LEAST_CHANNELS = FOURIER_LEAST_CHANNELS  # of the input and of the result
 # At a time: enough for the products to be fast, few enough for a core's share of the usual caches.
 _TILES = 96
+
+
+def unchecked() -> None:
+    """For work that is never broken off."""
 
 
 class FourierConvolution:
@@ -40,8 +45,9 @@ class FourierConvolution:
         self._weights = _spectral_weights(weight).to(dtype)
         self._sum_weights = weight.sum((2, 3)).T / SIZE**2  # (C, O)
 
-    def __call__(self, x: Tensor) -> Tensor:
-        """(1, C, H, W) channels_last -> (1, O, H - k + 1, W - k + 1) channels_last."""
+    def __call__(self, x: Tensor, check: Callable[[], None] = unchecked) -> Tensor:
+        """(1, C, H, W) channels_last -> (1, O, H - k + 1, W - k + 1) channels_last. `check` is called every few milliseconds;
+        what it raises ends the work."""
         _, channels, height, width = x.shape
         frequencies, _, outputs = self._weights.shape
         step = SIZE - self.kernel + 1
@@ -59,6 +65,7 @@ class FourierConvolution:
         spectra = torch.empty(frequencies * at_once * 2 * channels, dtype=self.dtype)
         products = torch.empty(frequencies * at_once * outputs, dtype=self.dtype)
         for first in range(0, count, at_once):
+            check()
             tiles = min(at_once, count - first)
             own = spectra[: frequencies * tiles * 2 * channels].view(frequencies, tiles, 2 * channels)
             product = products[: frequencies * tiles * outputs].view(frequencies, tiles, outputs)

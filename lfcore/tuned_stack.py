@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
 
-from lfcore.fourier import LEAST_CHANNELS, FourierConvolution
+from lfcore.fourier import LEAST_CHANNELS, FourierConvolution, unchecked
 from lfcore.layers import make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Window
@@ -18,7 +17,7 @@ from lfcore.winograd import can_compute
 
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
-Layer = Callable[[Tensor], Tensor]
+Layer = Callable[[Tensor, Callable[[], None]], Tensor]  # of a picture, and what is called now and then
 _STEP = 16  # widths that are multiples of it suit the blocks in which convolutions are computed
 
 
@@ -94,10 +93,6 @@ def _spans(size: int, most: int) -> list[tuple[int, int]]:
     return list(pairwise([*range(0, size, step), size]))
 
 
-def _unchecked() -> None:
-    pass
-
-
 class TunedStack:
     """A PaperStack for inference: its hidden layers in the tuned type, in channels_last order, their channels filled.
 
@@ -130,12 +125,11 @@ class TunedStack:
         tile.mirror(x)
         return x
 
-    def __call__(self, x: Tensor, check: Callable[[], None] = _unchecked) -> Tensor:
+    def __call__(self, x: Tensor, check: Callable[[], None] = unchecked) -> Tensor:
         """An input as `empty_input` makes it to (1, outputs, height - 12, width - 12) float32. `check` is called before
-        each hidden layer; what it raises ends the work."""
+        each hidden layer, and within long ones; what it raises ends the work."""
         for layer in self._hidden:
-            check()
-            x = layer(x)
+            x = layer(x, check)
         result: Tensor = self._last(x[:, : self._outputs].float())
         return result
 
@@ -145,7 +139,13 @@ def _tuned(layer: nn.Conv2d, tuning: Tuning) -> Layer:
     assert layer.bias is not None
     if tuning.fourier and not (tuning.winograd and can_compute(layer.weight, tuning.dtype)):
         return FourierConvolution(layer, tuning.dtype)
-    return partial(make_layer(layer.weight, layer.bias, tuning.dtype, tuning.fourier and tuning.winograd), positive=True)
+    plain = make_layer(layer.weight, layer.bias, tuning.dtype, tuning.fourier and tuning.winograd)
+
+    def computed(x: Tensor, check: Callable[[], None]) -> Tensor:
+        check()
+        return plain(x, positive=True)
+
+    return computed
 
 
 def _filled(layer: nn.Conv2d, multiple: int, least: int) -> nn.Conv2d:

@@ -5,6 +5,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from lfcore.errors import Cancelled
 from lfcore.fourier import LEAST_CHANNELS, SIZE, FourierConvolution
 
 pytestmark = pytest.mark.usefixtures("compiled_kernels")
@@ -90,6 +91,25 @@ def test_the_same_on_any_number_of_threads() -> None:
         torch.testing.assert_close(convolution(x), one, atol=1e-6, rtol=0)
     finally:
         torch.set_num_threads(threads)
+
+
+def test_it_can_be_broken_off_within_a_picture() -> None:
+    layer, x, _ = case((16, 16), 7, (260, 260))  # 26 x 26 tiles, of which fewer than a hundred are in work at once
+    convolution = FourierConvolution(layer, torch.float32)
+    asked = 0
+
+    def check(most: int = 3) -> None:
+        nonlocal asked
+        asked += 1
+        if asked > most:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        convolution(x, check)
+    assert asked == 4
+    asked = 0
+    convolution(x, lambda: check(1000))
+    assert asked >= 26 * 26 / 100
 
 
 def test_layers_that_it_cannot_compute_are_refused() -> None:
