@@ -17,7 +17,7 @@ from lfcore.winograd import can_compute
 
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
-Layer = Callable[[Tensor, Callable[[], None]], Tensor]  # of a picture, and what is called now and then
+HiddenLayer = Callable[[Tensor, Callable[[], None]], Tensor]  # of a picture, and what is called now and then
 _STEP = 16  # widths that are multiples of it suit the blocks in which convolutions are computed
 
 
@@ -134,12 +134,13 @@ class TunedStack:
         return result
 
 
-def _tuned(layer: nn.Conv2d, tuning: Tuning) -> Layer:
+def _tuned(layer: nn.Conv2d, tuning: Tuning) -> HiddenLayer:
     """The layer with its ReLU."""
     assert layer.bias is not None
-    if tuning.fourier and not (tuning.winograd and can_compute(layer.weight, tuning.dtype)):
+    winograd = tuning.fourier and tuning.winograd and can_compute(layer.weight, tuning.dtype)
+    if tuning.fourier and not winograd:
         return FourierConvolution(layer, tuning.dtype)
-    plain = make_layer(layer.weight, layer.bias, tuning.dtype, tuning.fourier and tuning.winograd)
+    plain = make_layer(layer.weight, layer.bias, tuning.dtype, winograd)
 
     def computed(x: Tensor, check: Callable[[], None]) -> Tensor:
         check()

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from lfcore import kernels
+from lfcore import winograd as winograds
 from lfcore.compact import CompactConfig, CompactModel, initialise_compact
 from lfcore.compact_inference import CompactInference, sweep_input
 from lfcore.compact_parts import MIDDLE, full_size
@@ -42,8 +43,14 @@ def test_phases_are_put_together_at_their_places() -> None:
 
 
 @pytest.mark.parametrize("winograd", [False, True])
+@pytest.mark.parametrize("halves", [False, True])  # whether the processor multiplies bfloat16, where it can
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_the_disparity_is_that_of_the_model(model: CompactModel, dtype: torch.dtype, winograd: bool) -> None:
+def test_the_disparity_is_that_of_the_model(
+    model: CompactModel, dtype: torch.dtype, halves: bool, winograd: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not halves:
+        for module in (kernels, winograds):
+            monkeypatch.setattr(module, "can_convolve", lambda dtype: kernels.compiled() and dtype == torch.float32)
     torch.manual_seed(1)
     luma, offsets, window = torch.rand(4, 1, 40, 44), corner_offsets(0.3, 0.6), Window(13, 27, 13, 31)
     levels = Levels(12, -4.5, 4.5)
@@ -56,21 +63,6 @@ def test_the_disparity_is_that_of_the_model(model: CompactModel, dtype: torch.dt
         torch.testing.assert_close(full_size(found)[None, None], expected, atol=2e-4, rtol=1e-4)
     else:  # hidden values are rounded to a part in 256
         assert float((full_size(found)[None, None] - expected).abs().mean()) < 0.05 * float(expected.std())
-
-
-def test_pixels_of_bfloat16_are_multiplied_without_an_instruction_for_it(
-    model: CompactModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    torch.manual_seed(7)
-    features = torch.rand(1, 24, 14, 18).bfloat16().contiguous(memory_format=torch.channels_last)
-    found = []
-    with torch.inference_mode():
-        for can_halve in (True, False):
-            if not can_halve:
-                monkeypatch.setattr(kernels, "can_convolve", lambda dtype: dtype == torch.float32)
-            found.append(CompactInference(model, Tuning(torch.bfloat16)).disparity(features))
-    # The matrices' own rounding is all that differs.
-    assert float((found[0] - found[1]).abs().mean()) < 0.01 * float(found[1].std())
 
 
 @pytest.mark.parametrize("cut", [(0, 0), (1, 3)])

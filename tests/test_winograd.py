@@ -108,14 +108,16 @@ def test_what_comes_before_and_after_is_what_a_layer_promises(
         assert torch.equal(part, before)  # what was handed over is as it was
 
 
-def test_zeros_beyond_the_picture_do_not_depend_on_what_lies_in_memory(kernels_for: Callable[[torch.dtype], None]) -> None:
+@pytest.mark.parametrize("dtype", TYPES)
+def test_zeros_beyond_the_picture_do_not_depend_on_what_lies_in_memory(
+    dtype: torch.dtype, kernels_for: Callable[[torch.dtype], None]
+) -> None:
     """A picture of ones by a kernel of ones: as many as there are samples around a pixel, at the borders fewer."""
-    for dtype in TYPES:
-        kernels_for(dtype)
-        x = torch.ones(1, 32, 11, 13, dtype=dtype).contiguous(memory_format=torch.channels_last)
-        found = WinogradConvolution(torch.ones(32, 32, 3, 3) / 32, None, 1, dtype=dtype)(x)
-        expected = F.conv2d(torch.ones(1, 1, 11, 13), torch.ones(1, 1, 3, 3), padding=1).expand_as(found)
-        torch.testing.assert_close(found.float(), expected, atol=0.1 if dtype == torch.bfloat16 else 1e-4, rtol=0)
+    kernels_for(dtype)
+    x = torch.ones(1, 32, 11, 13, dtype=dtype).contiguous(memory_format=torch.channels_last)
+    found = WinogradConvolution(torch.ones(32, 32, 3, 3) / 32, None, 1, dtype=dtype)(x)
+    expected = F.conv2d(torch.ones(1, 1, 11, 13), torch.ones(1, 1, 3, 3), padding=1).expand_as(found)
+    torch.testing.assert_close(found.float(), expected, atol=0.1 if dtype == torch.bfloat16 else 1e-4, rtol=0)
 
 
 @pytest.mark.parametrize("dtype", TYPES)
