@@ -42,7 +42,7 @@ class CompactInference:
     """Both networks of a model, whose weights are copied, by the type and the way that `tuning` says."""
 
     def __init__(self, model: CompactModel, tuning: Tuning) -> None:
-        self.dtype, self._winograd = tuning.dtype, tuning.winograd
+        self.dtype, self._way = tuning.dtype, tuning.way
         config, disparity, colour = model.config, model.disparity, model.colour
         levels = config.levels.count
         with torch.no_grad():
@@ -81,7 +81,7 @@ class CompactInference:
             weight, bias = weight[outputs], None if bias is None else bias[outputs]
         (stride, _), padding, (dilation, _) = convolution.stride, convolution.padding[0], convolution.dilation
         assert isinstance(padding, int)
-        return make_layer(weight, bias, self.dtype, self._winograd, stride, padding, dilation)
+        return make_layer(weight, bias, self.dtype, self._way, stride, padding, dilation)
 
     def _block_layers(self, blocks: nn.Sequential) -> list[tuple[Layer, Layer]]:
         return [(self._layer(block.first), self._layer(block.second)) for block in blocks if isinstance(block, ResidualBlock)]

@@ -3,24 +3,32 @@
 The picture is cut into overlapping tiles of 16 x 16 px. Between a transform and its inverse, a convolution with a kernel of
 k x k px is a product of matrices at each frequency, (tiles, channels in) by (channels in, channels out), and gives 17 - k px
 of a tile along each axis ("overlap-save"): 576 real multiplications a tile and pair of channels, where 7 x 7 px take 4900 for
-the same 100 pixels, 5 x 5 take 3600 for 144, 3 x 3 take 1764 for 196. The transforms are compiled (lfcore.kernels), the
-products torch's.
+the same 100 pixels, 5 x 5 take 3600 for 144, 3 x 3 take 1764 for 196. The transforms are compiled (lfcore.kernels); the
+products are torch's, or those of the processor's matrix unit.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Protocol
 
 import torch
 from torch import Tensor, nn
 
-from lfcore.kernels import FOURIER_LEAST_CHANNELS, fourier_backward, fourier_forward
+from lfcore.kernels import (
+    FOURIER_FREQUENCIES,
+    FOURIER_LEAST_CHANNELS,
+    amx_packed,
+    amx_products,
+    amx_room,
+    fourier_backward,
+    fourier_forward,
+    has_amx,
+)
 
 SIZE = 16  # px of a tile
 LEAST_CHANNELS = FOURIER_LEAST_CHANNELS  # of the input and of the result
-# At a time: enough for the products to be fast, few enough for a core's share of the usual caches.
-_TILES = 96
 
 
 def unchecked() -> None:
@@ -42,18 +50,19 @@ class FourierConvolution:
         assert min(layer.in_channels, layer.out_channels) >= LEAST_CHANNELS
         self._bias = layer.bias.detach().float().clone()
         weight = layer.weight.detach().float()
-        self._weights = _spectral_weights(weight).to(dtype)
+        self._products = _products_with(_spectral_weights(weight), dtype)
+        self._channels, self._outputs = layer.in_channels, layer.out_channels
         self._sum_weights = weight.sum((2, 3)).T / SIZE**2  # (C, O)
 
     def __call__(self, x: Tensor, check: Callable[[], None] = unchecked) -> Tensor:
         """(1, C, H, W) channels_last -> (1, O, H - k + 1, W - k + 1) channels_last. `check` is called every few milliseconds;
         what it raises ends the work."""
         _, channels, height, width = x.shape
-        frequencies, _, outputs = self._weights.shape
+        assert channels == self._channels
         step = SIZE - self.kernel + 1
         out = torch.empty(
             1,
-            outputs // 2,
+            self._outputs,
             height - self.kernel + 1,
             width - self.kernel + 1,
             dtype=self.dtype,
@@ -61,18 +70,71 @@ class FourierConvolution:
         )
         count = math.ceil(out.shape[2] / step) * math.ceil(out.shape[3] / step)
         # Blocks of about equal size, an odd number of tiles: frequencies should not all fall on the same places of a cache.
-        at_once = math.ceil(count / math.ceil(count / _TILES)) | 1
-        spectra = torch.empty(frequencies * at_once * 2 * channels, dtype=self.dtype)
-        products = torch.empty(frequencies * at_once * outputs, dtype=self.dtype)
+        at_once = math.ceil(count / math.ceil(count / self._products.tiles)) | 1
+        room = self._products.room(at_once)
         for first in range(0, count, at_once):
             check()
             tiles = min(at_once, count - first)
-            own = spectra[: frequencies * tiles * 2 * channels].view(frequencies, tiles, 2 * channels)
-            product = products[: frequencies * tiles * outputs].view(frequencies, tiles, outputs)
+            own = room[: FOURIER_FREQUENCIES * tiles * 2 * channels].view(FOURIER_FREQUENCIES, tiles, 2 * channels)
             sums = torch.empty(tiles, channels)
             fourier_forward(x, own, sums, step, first)
-            torch.bmm(own, self._weights, out=product)
+            product = self._products(room, tiles)
             fourier_backward(product, sums @ self._sum_weights, self._bias, out, step, first)
+        return out
+
+
+class _Products(Protocol):
+    """Products of spectra with matrices (129, 2 C, 2 O)."""
+
+    @property
+    def tiles(self) -> int:
+        """How many at a time: enough for the products to be fast, few enough for a core's share of the usual caches."""
+
+    def room(self, tiles: int) -> Tensor:
+        """Flat memory for the spectra of so many tiles."""
+
+    def __call__(self, room: Tensor, tiles: int) -> Tensor:
+        """Spectra (129, tiles, 2 C), with which `room` begins, to (129, tiles, 2 O)."""
+
+
+def _products_with(matrices: Tensor, dtype: torch.dtype) -> _Products:
+    """The faster ones there are here."""
+    if dtype == torch.bfloat16 and has_amx():
+        return _AmxProducts(matrices)
+    return _TorchProducts(matrices, dtype)
+
+
+class _TorchProducts:
+    """See _Products."""
+
+    tiles = 96
+
+    def __init__(self, matrices: Tensor, dtype: torch.dtype) -> None:
+        self._matrices = matrices.to(dtype)
+
+    def room(self, tiles: int) -> Tensor:
+        return torch.empty(tiles * self._matrices[:, :, 0].numel(), dtype=self._matrices.dtype)
+
+    def __call__(self, room: Tensor, tiles: int) -> Tensor:
+        frequencies, values, _ = self._matrices.shape
+        return torch.bmm(room[: frequencies * tiles * values].view(frequencies, tiles, values), self._matrices)
+
+
+class _AmxProducts:
+    """See _Products: by the matrix unit (lfcore.kernels), which reads the matrices anew for every block of tiles."""
+
+    tiles = 191
+
+    def __init__(self, matrices: Tensor) -> None:
+        _, self._values, self._columns = matrices.shape
+        self._packed = amx_packed(matrices)
+
+    def room(self, tiles: int) -> Tensor:
+        return amx_room(FOURIER_FREQUENCIES, tiles, self._values)
+
+    def __call__(self, room: Tensor, tiles: int) -> Tensor:
+        out = torch.empty(FOURIER_FREQUENCIES, tiles, self._columns, dtype=torch.bfloat16)
+        amx_products(room, self._values, self._packed, out)
         return out
 
 

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Protocol
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.winograd import WinogradConvolution, can_compute
+from lfcore import amx, winograd
+
+
+class Way(Enum):
+    """How a convolution is computed."""
+
+    TORCH = "torch"
+    WINOGRAD = "winograd"  # by Winograd's transforms (lfcore.winograd)
+    AMX = "amx"  # by the processor's matrix unit (lfcore.amx)
 
 
 class Layer(Protocol):
@@ -38,12 +47,14 @@ def make_layer(
     weight: Tensor,
     bias: Tensor | None,
     dtype: torch.dtype,
-    winograd: bool,
+    way: Way,
     stride: int = 1,
     padding: int = 0,
     dilation: int = 1,
 ) -> Layer:
-    """A layer in a type. weight: (out, in, k, k) float32. winograd: by Winograd's transforms, where it can be."""
-    if winograd and stride == 1 and can_compute(weight, dtype):
-        return WinogradConvolution(weight, bias, padding, dilation, dtype)
+    """A layer in a type. weight: (out, in, k, k) float32. Where `way` has nothing for such a layer, it is torch's."""
+    if way is Way.WINOGRAD and stride == 1 and winograd.can_compute(weight, dtype):
+        return winograd.WinogradConvolution(weight, bias, padding, dilation, dtype)
+    if way is Way.AMX and amx.can_compute(weight, dtype, dilation):
+        return amx.AmxConvolution(weight, bias, stride, padding, dilation)
     return DirectConvolution(weight.to(dtype), None if bias is None else bias.to(dtype), stride, padding, dilation)

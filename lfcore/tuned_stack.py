@@ -10,10 +10,9 @@ import torch
 from torch import Tensor, nn
 
 from lfcore.fourier import LEAST_CHANNELS, FourierConvolution, unchecked
-from lfcore.layers import make_layer
+from lfcore.layers import DirectConvolution, Way, make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Window
-from lfcore.winograd import can_compute
 
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
@@ -29,14 +28,14 @@ class Tuning:
     tile_width: int = 272  # px that come out; the height follows from tile_pixels
     channel_multiple: int = 1  # channels of hidden layers are filled up with zeros to a multiple of this
     tile_pixels: int = TILE_PIXELS
-    fourier: bool = False  # whether convolutions are computed by Fourier transforms (lfcore.fourier), channels as they are
-    # Whether those with 3 x 3 kernels are by Winograd's (lfcore.winograd): of the small pair, and beside Fourier transforms.
-    winograd: bool = False
+    way: Way = Way.TORCH  # in which convolutions are computed, those of the small pair too
+    # Whether Fourier transforms (lfcore.fourier) are the way of larger kernels than 3 x 3, and of those where `way` is torch's.
+    fourier: bool = False
 
     @classmethod
-    def by_fourier(cls, dtype: torch.dtype, winograd: bool = False) -> Tuning:
+    def by_fourier(cls, dtype: torch.dtype, way: Way = Way.TORCH) -> Tuning:
         """With Fourier transforms: in tiles that are larger, since the transforms' own have overlaps already."""
-        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, True, winograd)
+        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, way, fourier=True)
 
     def tiles(self, height: int, width: int) -> Iterator[Tile]:
         """Cover a picture with tiles of about equal size, from the top left."""
@@ -137,10 +136,9 @@ class TunedStack:
 def _tuned(layer: nn.Conv2d, tuning: Tuning) -> HiddenLayer:
     """The layer with its ReLU."""
     assert layer.bias is not None
-    winograd = tuning.fourier and tuning.winograd and can_compute(layer.weight, tuning.dtype)
-    if tuning.fourier and not winograd:
+    plain = make_layer(layer.weight, layer.bias, tuning.dtype, tuning.way)
+    if tuning.fourier and (layer.kernel_size != (3, 3) or isinstance(plain, DirectConvolution)):
         return FourierConvolution(layer, tuning.dtype)
-    plain = make_layer(layer.weight, layer.bias, tuning.dtype, winograd)
 
     def computed(x: Tensor, check: Callable[[], None]) -> Tensor:
         check()

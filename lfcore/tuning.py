@@ -1,5 +1,5 @@
-"""How convolutions are computed on this machine: number type, directly or by transforms, width of tiles, filled channels.
-Measured once, remembered.
+"""How convolutions are computed on this machine: number type, the way of small and of large kernels, width of tiles, filled
+channels. Measured once, remembered.
 
 What is fastest differs widely: bfloat16 gains four-fold with AMX and loses without AVX-512; channel counts that are multiples
 of 32 gain three-fold with AMX and lose a quarter without; Fourier transforms gain three-fold without AMX. So the layers
@@ -25,10 +25,9 @@ import torch
 from lfcore.atomic import atomic_path
 from lfcore.errors import OutputError
 from lfcore.kernels import compiled
-from lfcore.layers import Layer, make_layer
+from lfcore.layers import DirectConvolution, Layer, Way, make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
-from lfcore.winograd import can_compute
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
 _SURE_ROUNDS = 4
@@ -77,7 +76,7 @@ def measured(
     cost, sure_kind = _fastest(kinds, 4 if by_transforms else 2, began + _BUDGET_SECONDS / 2)
     kind = _clearly_least([_clearly_least(same, cost, 0.9) for same in (exact_kinds, short_kinds)], cost, 0.8)
     if kind.fourier:
-        return Tuning.by_fourier(kind.dtype, kind.winograd), sure_kind
+        return Tuning.by_fourier(kind.dtype, kind.way), sure_kind
     shapes = [replace(kind, tile_width=width) for width in widths]
     cost, sure_shape = _fastest(shapes, 0, began + _BUDGET_SECONDS)
     return _clearly_least(shapes, cost, 0.93), sure_kind and sure_shape
@@ -85,24 +84,24 @@ def measured(
 
 def _kinds(dtype: torch.dtype, channels: Sequence[int], by_transforms: bool) -> list[Tuning]:
     """The choices in a type, of a small width, the plain one first."""
-    winograd = by_transforms and winograd_gains(dtype)
-    kinds = [Tuning(dtype, _SMALL_WIDTH, multiple, winograd=winograd) for multiple in channels]
+    way = best_way(dtype) if by_transforms else Way.TORCH
+    kinds = [Tuning(dtype, _SMALL_WIDTH, multiple, way=way) for multiple in channels]
     if by_transforms:
-        kinds.insert(1, replace(Tuning.by_fourier(dtype, winograd), tile_width=_SMALL_WIDTH))
+        kinds.insert(1, replace(Tuning.by_fourier(dtype, way), tile_width=_SMALL_WIDTH))
     return kinds
 
 
-def winograd_gains(dtype: torch.dtype) -> bool:
-    """Whether a layer like those of the small pair is clearly faster by Winograd's transforms."""
+def best_way(dtype: torch.dtype) -> Way:
+    """The one that is clearly faster than torch's for a layer like those of the small pair; where there is none, torch's."""
     with torch.random.fork_rng(devices=[]), torch.inference_mode():
         weight, bias = torch.randn(48, 48, 3, 3), torch.randn(48)
         x = torch.randn(1, 48, 96, 144).to(dtype).contiguous(memory_format=torch.channels_last)
-        if not can_compute(weight, dtype):
-            return False
-        direct, transformed = (make_layer(weight, bias, dtype, winograd, padding=1) for winograd in (False, True))
-        seconds = [(_seconds(direct, x), _seconds(transformed, x)) for _ in range(_ROUNDS)]
-    plainly, by_winograd = map(min, zip(*seconds, strict=True))
-    return by_winograd < 0.9 * plainly
+        layers = {way: make_layer(weight, bias, dtype, way, padding=1) for way in Way}
+        layers = {way: layer for way, layer in layers.items() if way is Way.TORCH or not isinstance(layer, DirectConvolution)}
+        turns = [{way: _seconds(layer, x) for way, layer in layers.items()} for _ in range(_ROUNDS)]
+    least = {way: min(turn[way] for turn in turns) for way in layers}
+    best = min(least, key=least.__getitem__)
+    return best if least[best] < 0.9 * least[Way.TORCH] else Way.TORCH
 
 
 def _seconds(layer: Layer, x: torch.Tensor) -> float:
@@ -165,11 +164,11 @@ def remembered() -> Tuning | None:
     values = _file_content().get(_machine_key(), {})
     try:
         dtype = _DTYPES[str(values["dtype"])]
-        winograd = values["winograd"] is True
+        way = Way(values["way"])
         if values["fourier"] is True:
-            return Tuning.by_fourier(dtype, winograd)
+            return Tuning.by_fourier(dtype, way)
         width, multiple = _within(values["tile_width"], 16, 4096), _within(values["channel_multiple"], 1, 64)
-        return Tuning(dtype, width, multiple, winograd=winograd)
+        return Tuning(dtype, width, multiple, way=way)
     except (KeyError, ValueError):
         return None
 
@@ -192,7 +191,7 @@ def _remember(tuning: Tuning) -> None:
         "tile_width": tuning.tile_width,
         "channel_multiple": tuning.channel_multiple,
         "fourier": tuning.fourier,
-        "winograd": tuning.winograd,
+        "way": tuning.way.value,
     }
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

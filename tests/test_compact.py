@@ -8,6 +8,7 @@ from scenes import plane
 from lfcore.compact import CompactModel, initialise_compact, log_nearness, spread_out
 from lfcore.compact_synthesizer import CompactSynthesizer
 from lfcore.errors import Cancelled, InputError
+from lfcore.layers import Way
 from lfcore.lightfield import CORNERS, LightField
 from lfcore.metrics import psnr
 from lfcore.synthesis import Synthesizer
@@ -79,12 +80,12 @@ def test_pictures_of_any_size_come_out_whole_and_like_a_larger_ones_part() -> No
     assert set(found.timings) == {"features", "disparity", "warp", "colour", "total"}
 
 
-@pytest.mark.parametrize("winograd", [False, True])
-def test_bfloat16_changes_little(winograd: bool) -> None:
+@pytest.mark.parametrize("way", Way)
+def test_bfloat16_changes_little(way: Way) -> None:
     field = plane(3.0, (2, 2), (64, 80))
     pictures = []
     for dtype in (torch.float32, torch.bfloat16):
-        synthesizer = untrained(Tuning(dtype, winograd=winograd))
+        synthesizer = untrained(Tuning(dtype, way=way))
         synthesizer.set_light_field(field)
         pictures.append(synthesizer.synthesize(0.4, 0.6).image)
     assert psnr(pictures[0], pictures[1]) > 40

@@ -9,6 +9,7 @@ from lfcore.compact import CompactConfig, CompactModel, initialise_compact
 from lfcore.compact_inference import CompactInference, sweep_input
 from lfcore.compact_parts import MIDDLE, full_size
 from lfcore.compact_synthesizer import REACH
+from lfcore.layers import Way
 from lfcore.planesweep import Levels, Window, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tuned_stack import Tuning
@@ -42,11 +43,11 @@ def test_phases_are_put_together_at_their_places() -> None:
     assert torch.equal(full_size(phases(picture)), picture)
 
 
-@pytest.mark.parametrize("winograd", [False, True])
+@pytest.mark.parametrize("way", Way)
 @pytest.mark.parametrize("halves", [False, True])  # whether the processor multiplies bfloat16, where it can
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
 def test_the_disparity_is_that_of_the_model(
-    model: CompactModel, dtype: torch.dtype, halves: bool, winograd: bool, monkeypatch: pytest.MonkeyPatch
+    model: CompactModel, dtype: torch.dtype, halves: bool, way: Way, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not halves:
         for module in (kernels, winograds):
@@ -57,7 +58,7 @@ def test_the_disparity_is_that_of_the_model(
     with torch.inference_mode():
         expected = model.disparity(plane_sweep(luma, offsets, levels, window))
         features = plane_sweep(sweep_input(luma), offsets, levels, window).to(dtype)
-        found = CompactInference(model, Tuning(dtype, winograd=winograd)).disparity(features)
+        found = CompactInference(model, Tuning(dtype, way=way)).disparity(features)
     assert float(expected.std()) > 0.1
     if dtype == torch.float32:
         torch.testing.assert_close(full_size(found)[None, None], expected, atol=2e-4, rtol=1e-4)

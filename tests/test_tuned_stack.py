@@ -5,6 +5,7 @@ import pytest
 import torch
 import torch.nn.functional as F
 
+from lfcore.layers import Way
 from lfcore.networks import BORDER, PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
 
@@ -40,13 +41,13 @@ def test_tiles_of_a_filled_stack_are_parts_of_the_stack_on_the_mirrored_picture(
 
 
 @pytest.mark.usefixtures("compiled_kernels")
-@pytest.mark.parametrize("winograd", [False, True])
+@pytest.mark.parametrize("way", Way)
 @pytest.mark.parametrize("channels", [5, 24])
-def test_the_same_by_transforms(channels: int, winograd: bool) -> None:
+def test_the_same_by_transforms(channels: int, way: Way) -> None:
     torch.manual_seed(2)
     stack, features = PaperStack(channels, 3), torch.randn(1, channels, 50, 61)
     expected = stack(F.pad(features, (BORDER,) * 4, mode="reflect"))
-    tuning = dataclasses.replace(Tuning.by_fourier(torch.float32, winograd), tile_width=32, tile_pixels=32 * 20)
+    tuning = dataclasses.replace(Tuning.by_fourier(torch.float32, way), tile_width=32, tile_pixels=32 * 20)
     tuned = TunedStack(stack, tuning)
     with torch.inference_mode():
         for tile in tuning.tiles(50, 61):

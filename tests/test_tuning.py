@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from lfcore import tuning
-from lfcore.layers import DirectConvolution
+from lfcore.layers import DirectConvolution, Way
 from lfcore.tuned_stack import Tuning
 
-CHOICE = Tuning(torch.bfloat16, 208, 32, winograd=True)
+CHOICE = Tuning(torch.bfloat16, 208, 32, way=Way.WINOGRAD)
 
 
 @pytest.fixture(autouse=True)
@@ -39,8 +39,8 @@ def test_what_was_measured_is_remembered(measurements: list[Tuning], folder: Pat
     tuning.machine_tuning.cache_clear()  # as a new process begins
     assert tuning.machine_tuning() == CHOICE
     assert len(measurements) == 1
-    for winograd in (False, True):
-        by_fourier = Tuning.by_fourier(torch.bfloat16, winograd)
+    for way in Way:
+        by_fourier = Tuning.by_fourier(torch.bfloat16, way)
         tuning._remember(by_fourier)
         assert tuning.remembered() == by_fourier
     assert [path.name for path in folder.iterdir()] == ["tuning.json"]  # nothing else is left behind
@@ -82,13 +82,13 @@ def test_a_place_that_cannot_be_written_is_no_hindrance(measurements: list[Tunin
 
 
 def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    def choose(short: float, filled: float, narrow: float, fourier: float = 2.0, winograd: torch.dtype | None = None) -> Tuning:
+    def choose(short: float, filled: float, narrow: float, fourier: float = 2.0, gaining: torch.dtype | None = None) -> Tuning:
         def seconds(choice: Tuning) -> float:
             kind = (short if choice.dtype == torch.bfloat16 else 1.0) * (filled if choice.channel_multiple == 16 else 1.0)
             return kind * (narrow if choice.tile_width == 144 else 1.0) * (fourier if choice.fourier else 1.0)
 
         monkeypatch.setattr(tuning, "_probe", lambda choice: lambda: seconds(choice))
-        monkeypatch.setattr(tuning, "winograd_gains", lambda dtype: dtype == winograd)
+        monkeypatch.setattr(tuning, "best_way", lambda dtype: Way.WINOGRAD if dtype == gaining else Way.TORCH)
         chosen, sure = tuning.measured(transforms=True)
         assert sure
         return chosen
@@ -100,9 +100,9 @@ def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.Mon
     assert choose(0.9, 1.0, 0.97, 0.95) == Tuning(torch.float32, 272, 1)
     assert choose(0.9, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.float32)
     assert choose(0.5, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.bfloat16)
-    assert choose(0.5, 0.7, 0.6, 0.5, torch.bfloat16) == Tuning.by_fourier(torch.bfloat16, winograd=True)
+    assert choose(0.5, 0.7, 0.6, 0.5, torch.bfloat16) == Tuning.by_fourier(torch.bfloat16, Way.WINOGRAD)
     assert choose(0.5, 0.7, 0.6, 0.5, torch.float32) == Tuning.by_fourier(torch.bfloat16)
-    assert choose(0.9, 0.7, 0.6, winograd=torch.float32) == Tuning(torch.float32, 144, 16, winograd=True)
+    assert choose(0.9, 0.7, 0.6, gaining=torch.float32) == Tuning(torch.float32, 144, 16, way=Way.WINOGRAD)
 
 
 def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,21 +142,31 @@ def test_it_measures_this_machine_and_leaves_random_numbers_alone() -> None:
 def test_by_transforms_is_measured_too() -> None:
     chosen, _ = tuning.measured(widths=(144,), channels=(1,))
     types = torch.float32, torch.bfloat16
-    directly = [Tuning(dtype, 144, winograd=winograd) for dtype in types for winograd in (False, True)]
-    assert chosen in [*directly, *(Tuning.by_fourier(dtype, winograd) for dtype in types for winograd in (False, True))]
+    directly = [Tuning(dtype, 144, way=way) for dtype in types for way in Way]
+    assert chosen in [*directly, *(Tuning.by_fourier(dtype, way) for dtype in types for way in Way)]
 
 
-def test_winograds_transforms_are_for_where_they_are_faster(monkeypatch: pytest.MonkeyPatch) -> None:
-    seconds = {DirectConvolution: 1.0}
-    monkeypatch.setattr(tuning, "can_compute", lambda weight, dtype: dtype == torch.float32)
-    monkeypatch.setattr(tuning, "_seconds", lambda layer, x: seconds.get(type(layer), 0.5))
-    monkeypatch.setattr(
-        tuning, "make_layer", lambda *layer, padding: (_Transformed if layer[3] else DirectConvolution)(*layer[:2])
-    )
-    assert tuning.winograd_gains(torch.float32) and not tuning.winograd_gains(torch.bfloat16)
-    seconds[_Transformed] = 0.95  # not worth its lost digits
-    assert not tuning.winograd_gains(torch.float32)
+def test_a_way_is_for_where_it_is_clearly_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    seconds = {Way.TORCH: 1.0, Way.WINOGRAD: 0.7, Way.AMX: 0.5}
+    possible = {torch.float32: [Way.TORCH, Way.WINOGRAD], torch.bfloat16: list(Way)}
+
+    def layer(weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, way: Way, padding: int) -> object:
+        return _Other(way) if way in possible[dtype] and way is not Way.TORCH else DirectConvolution(weight, bias)
+
+    monkeypatch.setattr(tuning, "make_layer", layer)
+    monkeypatch.setattr(tuning, "_seconds", lambda layer, x: seconds[getattr(layer, "way", Way.TORCH)])
+    assert tuning.best_way(torch.float32) is Way.WINOGRAD
+    assert tuning.best_way(torch.bfloat16) is Way.AMX
+    seconds[Way.WINOGRAD] = 0.4
+    assert tuning.best_way(torch.bfloat16) is Way.WINOGRAD
+    seconds[Way.WINOGRAD] = 0.95  # not worth its lost digits
+    assert tuning.best_way(torch.float32) is Way.TORCH
+    possible[torch.float32] = [Way.TORCH]  # what is asked for and cannot be is torch's, and is not timed as another
+    assert tuning.best_way(torch.float32) is Way.TORCH
 
 
-class _Transformed(DirectConvolution):
-    """In place of a layer by transforms, which not every machine has."""
+class _Other:
+    """In place of a layer that not every machine has."""
+
+    def __init__(self, way: Way) -> None:
+        self.way = way

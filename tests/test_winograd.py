@@ -9,7 +9,7 @@ from torch import Tensor
 
 from lfcore import kernels
 from lfcore.kernels import can_convolve
-from lfcore.layers import DirectConvolution, Layer, make_layer
+from lfcore.layers import DirectConvolution, Layer, Way, make_layer
 from lfcore.winograd import WinogradConvolution
 
 
@@ -124,11 +124,11 @@ def test_zeros_beyond_the_picture_do_not_depend_on_what_lies_in_memory(
 def test_it_is_used_where_it_is_asked_for_and_possible(dtype: torch.dtype, kernels_for: Callable[[torch.dtype], None]) -> None:
     kernels_for(dtype)
 
-    def chosen(outputs: int, inputs: int, kernel: int = 3, winograd: bool = True, stride: int = 1) -> type:
-        return type(make_layer(torch.randn(outputs, inputs, kernel, kernel), None, dtype, winograd, stride, 1, 1))
+    def chosen(outputs: int, inputs: int, kernel: int = 3, way: Way = Way.WINOGRAD, stride: int = 1) -> type:
+        return type(make_layer(torch.randn(outputs, inputs, kernel, kernel), None, dtype, way, stride, 1, 1))
 
     assert chosen(48, 48) is chosen(32, 16) is WinogradConvolution
-    assert chosen(48, 48, kernel=1) is chosen(48, 48, stride=2) is chosen(48, 48, winograd=False) is DirectConvolution
+    assert chosen(48, 48, kernel=1) is chosen(48, 48, stride=2) is chosen(48, 48, way=Way.TORCH) is DirectConvolution
     few = DirectConvolution if dtype == torch.float32 else WinogradConvolution
     assert chosen(12, 48) is chosen(48, 7) is few
 
@@ -136,7 +136,7 @@ def test_it_is_used_where_it_is_asked_for_and_possible(dtype: torch.dtype, kerne
 def test_without_compiled_kernels_layers_are_direct(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "_KERNELS", None)
     for dtype in TYPES:
-        assert type(make_layer(torch.randn(48, 48, 3, 3), None, dtype, True)) is DirectConvolution
+        assert type(make_layer(torch.randn(48, 48, 3, 3), None, dtype, Way.WINOGRAD)) is DirectConvolution
 
 
 @pytest.mark.usefixtures("either_route")
@@ -144,7 +144,7 @@ def test_without_compiled_kernels_layers_are_direct(monkeypatch: pytest.MonkeyPa
 def test_a_layer_computes_the_same_with_and_without_compiled_kernels(stride: int, dilation: int) -> None:
     torch.manual_seed(6)
     x, weight, bias = picture(20, 22, 26), torch.randn(40, 20, 3, 3), torch.randn(40)
-    found = make_layer(weight, bias, torch.float32, True, stride, dilation, dilation)(x)
+    found = make_layer(weight, bias, torch.float32, Way.WINOGRAD, stride, dilation, dilation)(x)
     torch.testing.assert_close(found, F.conv2d(x, weight, bias, stride, dilation, dilation), atol=1e-3, rtol=0)
 
 

@@ -8,6 +8,7 @@ on the CPU.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
 from types import ModuleType
 
@@ -22,15 +23,21 @@ _FUNCTIONS = (
     "fourier_backward",
     "winograd_convolution",
     "halves",
+    "amx",
+    "amx_products",
+    "amx_convolution",
     "compact_disparity",
     "compact_warp",
     "compact_blend",
 )
 
 FOURIER_LEAST_CHANNELS = 16  # as many as lie in a register
-_FOURIER_FREQUENCIES = 129  # of a tile of 16 x 16 px: what a real picture has, but for 0
+FOURIER_FREQUENCIES = 129  # of a tile of 16 x 16 px: what a real picture has, but for 0
 WINOGRAD_LEAST_CHANNELS = 8  # in float32
 COLUMNS = 16  # channels out that are multiplied together
+AMX_PIECE = 32  # values that the matrix unit multiplies at once
+AMX_MOST_PIECES = 512  # under a kernel
+_AMX_ROWS = 16
 _NEVER = -1e30  # a score that is never chosen
 
 
@@ -134,7 +141,7 @@ def _transform(
     assert _KERNELS is not None
     batch, channels, height, width = x.shape
     frequencies, tiles, parts = spectra.shape
-    assert frequencies == _FOURIER_FREQUENCIES and parts == 2 * channels and channels >= FOURIER_LEAST_CHANNELS and batch == 1
+    assert frequencies == FOURIER_FREQUENCIES and parts == 2 * channels and channels >= FOURIER_LEAST_CHANNELS and batch == 1
     assert sums.shape == (tiles, channels)
     assert first >= 0 and first + tiles <= math.ceil(result[0] / step) * math.ceil(result[1] / step)
     assert spectra.is_contiguous() and spectra.dtype == x.dtype
@@ -184,6 +191,80 @@ def winograd_convolution(
     addresses = (*_addresses((x, weights, bias)), 0 if plus is None else plus.data_ptr(), out.data_ptr())
     sizes = (height, width, channels, padding, groups, outputs, *size, dilation)
     _KERNELS.winograd_convolution(*addresses, *sizes, of_positive, positive, halved, torch.get_num_threads())
+
+
+def has_amx() -> bool:
+    """Whether there is a matrix unit for bfloat16, and it may be used: ONEDNN_MAX_CPU_ISA binds this as it binds torch."""
+    allowed = os.environ.get("ONEDNN_MAX_CPU_ISA", "DEFAULT").upper()
+    return _KERNELS is not None and (allowed == "DEFAULT" or "AMX" in allowed) and bool(_KERNELS.amx())
+
+
+def amx_packed(matrices: Tensor) -> Tensor:
+    """Matrices (N, C, P) as the matrix unit takes them, filled up: (N, groups, pieces, AMX_PIECE / 2, COLUMNS, 2)."""
+    filled = F.pad(matrices, (0, -matrices.shape[2] % COLUMNS, 0, -matrices.shape[1] % AMX_PIECE))
+    parts = filled.unflatten(2, (-1, COLUMNS)).unflatten(1, (-1, AMX_PIECE // 2, 2))
+    return parts.permute(0, 4, 1, 2, 5, 3).to(torch.bfloat16).contiguous()
+
+
+def amx_room(matrices: int, count: int, values: int) -> Tensor:
+    """Flat memory for the rows of `amx_products`, bfloat16, with what that reads, but does not use, beyond the last."""
+    return torch.empty(matrices * count * values + (_AMX_ROWS - 1) * values + AMX_PIECE, dtype=torch.bfloat16)
+
+
+def amx_products(room: Tensor, values: int, packed: Tensor, out: Tensor) -> None:
+    """Products of N matrices, where `has_amx`.
+
+    room: by `amx_room`, for as much or more; it begins with the rows, (N, M, C), finite. values: C. packed: by `amx_packed`, of
+    (N, C, P). out: (N, M, P) bfloat16, contiguous.
+    """
+    assert _KERNELS is not None
+    matrices, count, columns = out.shape
+    groups, pieces = math.ceil(columns / COLUMNS), math.ceil(values / AMX_PIECE)
+    assert packed.shape == (matrices, groups, pieces, AMX_PIECE // 2, COLUMNS, 2) and pieces <= AMX_MOST_PIECES
+    used = matrices * count * values
+    assert room.ndim == 1 and len(room) >= used + (_AMX_ROWS - 1) * values + AMX_PIECE
+    assert all(part.is_contiguous() and part.dtype == torch.bfloat16 for part in (room, packed, out))
+    room[used : used + AMX_PIECE] = 0  # multiplied by zeros, which must not meet what is no number
+    _KERNELS.amx_products(*_addresses((room, packed, out)), matrices, count, values, columns, torch.get_num_threads())
+
+
+@dataclass(frozen=True)
+class AmxKernel:
+    """A convolution's kernel and its place, as `amx_convolution` takes it."""
+
+    packed: Tensor  # (1, groups, pieces, AMX_PIECE / 2, COLUMNS, 2): see lfcore.amx
+    bias: Tensor  # (groups * COLUMNS,) float32
+    size: int  # px along both axes
+    stride: int
+    padding: int
+    dilation: int
+
+    def pieces(self, channels: int) -> int:
+        """How many pieces of channels lie under it: without gaps those of a row of pixels lie side by side."""
+        runs, run = (self.size, self.size) if self.dilation == 1 else (self.size**2, 1)
+        return runs * math.ceil(run * channels / AMX_PIECE)
+
+
+def amx_convolution(x: Tensor, kernel: AmxKernel, plus: Tensor | None, out: Tensor, of_positive: bool, positive: bool) -> None:
+    """A convolution as lfcore.layers.Layer describes it, where `has_amx`.
+
+    x: (1, C, H, W), channels_last, finite. plus: like `out`, or None. out: (1, O, h, w), channels_last, not x. All
+    bfloat16.
+    """
+    assert _KERNELS is not None
+    (batch, channels, height, width), (_, outputs, *size) = x.shape, out.shape
+    groups, pieces = math.ceil(outputs / COLUMNS), kernel.pieces(channels)
+    assert batch == 1 and pieces <= AMX_MOST_PIECES and kernel.packed.shape[1:3] == (groups, pieces)
+    assert kernel.packed.is_contiguous() and kernel.bias.shape == (groups * COLUMNS,)
+    lost = (kernel.size - 1) * kernel.dilation - 2 * kernel.padding
+    assert size == [(extent - lost - 1) // kernel.stride + 1 for extent in (height, width)] and min(size) > 0
+    assert plus is None or plus.shape == out.shape
+    assert x.dtype == kernel.packed.dtype == torch.bfloat16
+    _check((x, out) if plus is None else (x, out, plus), (kernel.bias,))
+    addresses = (*_addresses((x, kernel.packed, kernel.bias)), 0 if plus is None else plus.data_ptr(), out.data_ptr())
+    shape = (kernel.size, kernel.stride, kernel.padding, kernel.dilation)
+    sizes = (height, width, channels, *shape, groups, outputs, *size)
+    _KERNELS.amx_convolution(*addresses, *sizes, of_positive, positive, torch.get_num_threads())
 
 
 def paired(matrices: Tensor) -> Tensor:

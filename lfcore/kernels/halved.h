@@ -20,7 +20,8 @@ void halved_products(const uint16_t *rows, Py_ssize_t count, Py_ssize_t pairs, c
 #include <immintrin.h>
 
 /* Parts become parts of a function for these instructions only if they are for these, too. */
-#define HALVED target("avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,bmi,bmi2")
+#define HALVED_TARGET "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,bmi,bmi2"
+#define HALVED target(HALVED_TARGET)
 #define HALVED_PART static inline __attribute__((always_inline, HALVED))
 #define SUMS 24 /* registers of them, which leaves as many as a product needs of 32 */
 

@@ -1,0 +1,208 @@
+/* Convolution by the matrix unit (amx.h): sixteen neighbouring pixels are the rows of a block, and the channels under a kernel
+ * its values, where they lie. Threads take bands of rows, of which each first copies what it reads, with zeros around. */
+#include "amx.h"
+
+#ifdef AMX_COMPILED
+
+typedef struct {
+    const uint16_t *in; /* (height, width, channels) */
+    Py_ssize_t height, width, channels;
+    Py_ssize_t kernel, stride, padding, dilation; /* px along both axes; px of zeros around the picture */
+    int of_positive; /* whether negative values of the picture count as 0 */
+    const char *packed; /* (groups, pieces, 16, COLUMNS, 2) */
+    Py_ssize_t groups;
+    const float *bias; /* (groups * COLUMNS) */
+    const uint16_t *added; /* to the result, a picture like it, or NULL */
+    uint16_t *out; /* (result height, result width, outputs) */
+    Py_ssize_t result_height, result_width, outputs;
+    int positive; /* whether negative values of the result become 0 */
+    Py_ssize_t band; /* rows of the result that are computed together */
+} Convolution;
+
+#define CACHE_LINE 64
+#define BAND_BYTES (512 * 1024) /* of what a band reads: it should stay in a core's second cache */
+
+/* Values of a row of the copy: as far as the last block reaches, which may end beyond the result. */
+PART Py_ssize_t values_of_row(const Convolution *c) {
+    const Py_ssize_t blocks = (c->result_width + ROWS - 1) / ROWS, last = (blocks * ROWS - 1) * c->stride;
+    const Py_ssize_t pixels = at_least(last + (c->kernel - 1) * c->dilation + 1, c->width + 2 * c->padding);
+    return (pixels * c->channels + PIECE - 1) / PIECE * PIECE;
+}
+
+PART Py_ssize_t rows_of_band(const Convolution *c, Py_ssize_t band) {
+    return (band - 1) * c->stride + (c->kernel - 1) * c->dilation + 1;
+}
+
+/* At most as many rows as fit into the cache, so that each thread has equally many bands, and more than one. */
+PART Py_ssize_t best_band(const Convolution *c, int threads) {
+    const Py_ssize_t fitting = BAND_BYTES / (2 * values_of_row(c)) - (c->kernel - 1) * c->dilation - 1;
+    const Py_ssize_t most = at_least(fitting / c->stride + 1, 1), height = c->result_height;
+    const Py_ssize_t of_thread = at_least((height + most * threads - 1) / (most * threads), 2);
+    return (height + of_thread * threads - 1) / (of_thread * threads);
+}
+
+HALVED_PART void copy_values(const uint16_t *in, Py_ssize_t count, int of_positive, uint16_t *out) {
+    if (!of_positive) {
+        memcpy(out, in, count * sizeof *in);
+        return;
+    }
+    Py_ssize_t value = 0;
+    /* Their first bit is the sign, as that of whole numbers. */
+    for (; value + 32 <= count; value += 32)
+        _mm512_storeu_si512(out + value, _mm512_max_epi16(_mm512_loadu_si512(in + value), _mm512_setzero_si512()));
+    for (; value < count; ++value) out[value] = in[value] & 0x8000 ? 0 : in[value];
+}
+
+/* The rows that the result's rows from `first` on need, with zeros beside the picture. */
+HALVED_PART void copy_band(const Convolution *c, Py_ssize_t first, Py_ssize_t band, uint16_t *copy) {
+    const Py_ssize_t of_row = c->width * c->channels;
+    for (Py_ssize_t row = 0; row < rows_of_band(c, band); ++row) {
+        uint16_t *out = copy + row * values_of_row(c);
+        const Py_ssize_t from = first * c->stride + row - c->padding;
+        if (from < 0 || from >= c->height) {
+            memset(out, 0, values_of_row(c) * sizeof *out);
+            continue;
+        }
+        const Py_ssize_t left = c->padding * c->channels;
+        memset(out, 0, left * sizeof *out);
+        copy_values(c->in + from * of_row, of_row, c->of_positive, out + left);
+        memset(out + left + of_row, 0, (values_of_row(c) - left - of_row) * sizeof *out);
+    }
+}
+
+HALVED_PART __m512 floats_of(__m256i halves) {
+    return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(halves), 16));
+}
+
+/* What comes after the sums of sixteen channels of a pixel. */
+HALVED_PART __m512 finished(const Convolution *c, __m512 sums, __m256i added) {
+    if (c->added != NULL) sums = _mm512_add_ps(sums, floats_of(added));
+    return c->positive ? _mm512_max_ps(sums, _mm512_setzero_ps()) : sums;
+}
+
+/* The first `count` pixels of a block to the result, of which `place` is the first value: of a group of channels, those that
+ * count. */
+HALVED_PART void put_group(const Convolution *c, const float *sums, Py_ssize_t count, Py_ssize_t place, __mmask16 counting) {
+    for (Py_ssize_t pixel = 0; pixel < count; ++pixel, sums += COLUMNS, place += c->outputs) {
+        const __m256i added = c->added == NULL ? _mm256_setzero_si256() : _mm256_maskz_loadu_epi16(counting, c->added + place);
+        const __m512 values = finished(c, _mm512_loadu_ps(sums), added);
+        _mm256_mask_storeu_epi16(c->out + place, counting, (__m256i)_mm512_cvtneps_pbh(values));
+    }
+}
+
+/* The same of two groups side by side. */
+HALVED_PART void put_two_groups(
+    const Convolution *c, const float *sums, Py_ssize_t count, Py_ssize_t place, __mmask32 counting) {
+    for (Py_ssize_t pixel = 0; pixel < count; ++pixel, sums += 2 * COLUMNS, place += c->outputs) {
+        const __m512i added = c->added == NULL ? _mm512_setzero_si512() : _mm512_maskz_loadu_epi16(counting, c->added + place);
+        const __m512 low = finished(c, _mm512_loadu_ps(sums), _mm512_castsi512_si256(added));
+        const __m512 high = finished(c, _mm512_loadu_ps(sums + COLUMNS), _mm512_extracti64x4_epi64(added, 1));
+        _mm512_mask_storeu_epi16(c->out + place, counting, (__m512i)_mm512_cvtne2ps_pbh(high, low));
+    }
+}
+
+/* The lanes that count where so many channels are left. */
+PART uint32_t lanes(Py_ssize_t channels, int most) {
+    return (uint32_t)((UINT64_C(1) << at_most(channels, most)) - 1);
+}
+
+/* Where in a band's copy a block begins. */
+PART const char *block_at(const Convolution *c, const uint16_t *copy, Py_ssize_t row, Py_ssize_t column) {
+    return (const char *)(copy + row * c->stride * values_of_row(c) + column * c->stride * c->channels);
+}
+
+/* `together` blocks by `groups` groups, as constants; of the last ones some are computed again. */
+#define EACH_BLOCK(together, groups, product, put)                                                                             \
+    for (Py_ssize_t block = 0; block < blocks; block += (together)) {                                                          \
+        const char *places[together];                                                                                          \
+        for (int k = 0; k < (together); ++k) {                                                                                 \
+            const Py_ssize_t own = at_most(block + k, blocks - 1);                                                             \
+            places[k] = block_at(c, copy, own / across, own % across * ROWS);                                                  \
+        }                                                                                                                      \
+        product(pieces, places, matrix, c->bias + group * COLUMNS, sums);                                                      \
+        for (int k = 0; k < at_most(together, blocks - block); ++k) {                                                          \
+            const Py_ssize_t column = (block + k) % across * ROWS, pixel = (first + (block + k) / across) * c->result_width;   \
+            put(c, sums + k * ROWS * (groups)*COLUMNS, at_most(ROWS, c->result_width - column),                                \
+                (pixel + column) * c->outputs + group * COLUMNS, counting);                                                    \
+        }                                                                                                                      \
+    }
+
+AMX_PART void convolve_band(const Convolution *c, const Pieces *pieces, Py_ssize_t first, Py_ssize_t rows, const uint16_t *copy) {
+    _Alignas(64) float sums[4 * ROWS * COLUMNS];
+    const Py_ssize_t across = (c->result_width + ROWS - 1) / ROWS, blocks = rows * across;
+    for (Py_ssize_t group = 0; group < c->groups; group += 2) {
+        const char *matrix = c->packed + group * pieces->pieces * TILE_BYTES;
+        const uint32_t counting = lanes(c->outputs - group * COLUMNS, 2 * COLUMNS);
+        if (group + 1 < c->groups) {
+            EACH_BLOCK(2, 2, two_by_two, put_two_groups)
+        } else {
+            EACH_BLOCK(4, 1, four_by_one, put_group)
+        }
+    }
+}
+
+#define MOST_PIECES 512
+
+/* Kernels without gaps have the values of a row of pixels side by side; else each pixel's are taken by themselves. */
+static Py_ssize_t find_pieces(const Convolution *c, Py_ssize_t offsets[MOST_PIECES]) {
+    const Py_ssize_t runs = c->dilation == 1 ? 1 : c->kernel, run = c->kernel / runs * c->channels;
+    Py_ssize_t count = 0;
+    for (Py_ssize_t y = 0; y < c->kernel; ++y)
+        for (Py_ssize_t x = 0; x < runs; ++x)
+            for (Py_ssize_t value = 0; value < run && count < MOST_PIECES; value += PIECE)
+                offsets[count++] = 2 * (y * c->dilation * values_of_row(c) + x * c->dilation * c->channels + value);
+    return count;
+}
+
+__attribute__((target(AMX))) static int convolve(const Convolution *c, int threads) {
+    Py_ssize_t offsets[MOST_PIECES];
+    const Pieces pieces = {c->stride * c->channels * 2, offsets, find_pieces(c, offsets)};
+    int failed = 0;
+#pragma omp parallel num_threads(threads) reduction(| : failed)
+    {
+        /* With zeros at the end for what the last piece reads beyond the last pixel. */
+        const Py_ssize_t values = rows_of_band(c, c->band) * values_of_row(c);
+        uint16_t *copy = aligned_alloc(CACHE_LINE, (values + PIECE) * sizeof *copy);
+        failed |= copy == NULL;
+        if (!failed) memset(copy + values, 0, PIECE * sizeof *copy);
+        const TileShapes before = begin_tiles();
+#pragma omp for schedule(dynamic, 1)
+        for (Py_ssize_t first = 0; first < c->result_height; first += c->band)
+            if (!failed) {
+                const Py_ssize_t rows = at_most(c->band, c->result_height - first);
+                copy_band(c, first, rows, copy);
+                convolve_band(c, &pieces, first, rows, copy);
+            }
+        end_tiles(&before);
+        free(copy);
+    }
+    return failed;
+}
+
+PyObject *amx_convolution(PyObject *Py_UNUSED(module), PyObject *arguments) {
+    Convolution c = {0};
+    unsigned long long in, packed, bias, added, out;
+    int threads;
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnnppi", &in, &packed, &bias, &added, &out, &c.height, &c.width, &c.channels,
+                          &c.kernel, &c.stride, &c.padding, &c.dilation, &c.groups, &c.outputs, &c.result_height,
+                          &c.result_width, &c.of_positive, &c.positive, &threads))
+        return NULL;
+    c.in = at_address(in);
+    c.packed = at_address(packed);
+    c.bias = at_address(bias);
+    c.added = at_address(added);
+    c.out = at_address(out);
+    c.band = best_band(&c, threads);
+    int failed;
+    Py_BEGIN_ALLOW_THREADS
+    failed = convolve(&c, threads);
+    Py_END_ALLOW_THREADS
+    if (failed) return PyErr_NoMemory();
+    Py_RETURN_NONE;
+}
+
+#else
+
+PyObject *amx_convolution(PyObject *Py_UNUSED(module), PyObject *Py_UNUSED(arguments)) { Py_RETURN_NOTIMPLEMENTED; }
+
+#endif
