@@ -75,6 +75,11 @@ class Interface:
         _let_imgui_recover()
         imgui.backends.opengl3_init(GLSL_VERSION)
 
+    @property
+    def takes_from_networks(self) -> bool:
+        """Whether drawing takes cores that a synthesis wants."""
+        return self.in_software and self.controller.synthesizing
+
     def set_scale(self, scale: float) -> None:
         """Go to another content scale of text, unless the person has chosen one."""
         scale = self.controller.state.desk.scale or scale

@@ -22,8 +22,10 @@ from app.frametimes import FrameTimes
 from app.geometry import Size
 from app.interface import Interface
 from app.opening import make_engine, open_by_content, synthesis_process
+from app.pacing import Pace
 from lfcore.atomic import atomic_path
 from lfcore.errors import LfviewError, OutputError
+from lfcore.machine import core_count
 
 Picture = npt.NDArray[np.uint8]
 
@@ -43,6 +45,7 @@ class Offscreen:
         self._texture = context.texture(size, 4)
         self._target = Target(context.framebuffer([self._texture]), size)
         self.interface = Interface(controller, context, scale)
+        self._pace = Pace(frametimes.FRAME_SECONDS, core_count())
 
     def frame(self) -> Picture:
         """Draw a frame and read it: uint8 (H, W, 3), first row first."""
@@ -52,9 +55,15 @@ class Offscreen:
 
     def draw(self) -> None:
         """Draw a frame, until the graphics are done with it."""
-        imgui.get_io().delta_time = 1 / 60
-        self.interface.draw(self._target, time.monotonic())
-        self._context.finish()
+        imgui.get_io().delta_time = frametimes.FRAME_SECONDS
+        with self._pace.frame():
+            self.interface.draw(self._target, time.monotonic())
+            self._context.finish()
+
+    @property
+    def interval(self) -> float:
+        """The least time between the beginnings of two frames in a row, in seconds: as in a window."""
+        return self._pace.interval(self.interface.takes_from_networks)
 
     def settled(self) -> Picture:
         """The frame after imgui has found its sizes and every fade has ended."""
@@ -96,7 +105,7 @@ def measure_frames_offscreen(path: Path, seconds: float, model: str = "full") ->
         viewer = Offscreen(controller, context, (1280, 800), 1.0)
         try:
             controller.open(path)
-            return frametimes.measure(controller, viewer.draw, lambda: frametimes.FRAME_SECONDS, seconds, "off screen")
+            return frametimes.measure(controller, viewer.draw, lambda: viewer.interval, seconds, "off screen")
         finally:
             viewer.close()
 

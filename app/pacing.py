@@ -28,6 +28,10 @@ class Pace:
         yield
         self._cost += _WEIGHT * (time.process_time() - before - self._cost)
 
+    def interval(self, takes_from_networks: bool) -> float:
+        """The least time between the beginnings of two frames, in seconds."""
+        return self.sharing if takes_from_networks else self.shortest
+
     @property
     def sharing(self) -> float:
         """The least time between two frames, in seconds, that leaves the networks their share of the cores."""

@@ -290,8 +290,7 @@ class _Window:
     @property
     def interval(self) -> float:
         """The least time between the beginnings of two frames, in seconds."""
-        interface = self._at_hand
-        return self._pace.sharing if interface.in_software and interface.controller.synthesizing else self._pace.shortest
+        return self._pace.interval(self._at_hand.takes_from_networks)
 
     def _wait_seconds(self, more_due: bool) -> float:
         """How long to wait for events before the next frame; _IDLE_INTERVAL or more: there is nothing to draw until then."""

@@ -36,3 +36,8 @@ def test_dear_ones_take_their_share_of_the_cores_and_no_more(monkeypatch: pytest
 
 def test_the_picture_moves_however_dear_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     assert paced(monkeypatch, 0.5, 1).sharing == LONGEST_INTERVAL
+
+
+def test_only_what_is_taken_from_the_networks_makes_frames_fewer(monkeypatch: pytest.MonkeyPatch) -> None:
+    pace = paced(monkeypatch, 0.02, 2)
+    assert pace.interval(takes_from_networks=False) == SHORTEST < pace.interval(takes_from_networks=True) == pace.sharing

@@ -37,6 +37,7 @@ WINOGRAD_LEAST_CHANNELS = 8  # in float32
 COLUMNS = 16  # channels out that are multiplied together
 AMX_PIECE = 32  # values that the matrix unit multiplies at once
 AMX_MOST_PIECES = 512  # under a kernel
+AMX_MOST_VALUES = 64 * AMX_PIECE  # of rows that lie behind one another
 _AMX_ROWS = 16
 _NEVER = -1e30  # a score that is never chosen
 
@@ -220,7 +221,7 @@ def amx_products(room: Tensor, values: int, packed: Tensor, out: Tensor) -> None
     assert _KERNELS is not None
     matrices, count, columns = out.shape
     groups, pieces = math.ceil(columns / COLUMNS), math.ceil(values / AMX_PIECE)
-    assert packed.shape == (matrices, groups, pieces, AMX_PIECE // 2, COLUMNS, 2) and pieces <= AMX_MOST_PIECES
+    assert packed.shape == (matrices, groups, pieces, AMX_PIECE // 2, COLUMNS, 2) and values <= AMX_MOST_VALUES
     used = matrices * count * values
     assert room.ndim == 1 and len(room) >= used + (_AMX_ROWS - 1) * values + AMX_PIECE
     assert all(part.is_contiguous() and part.dtype == torch.bfloat16 for part in (room, packed, out))
@@ -279,6 +280,7 @@ class PixelMatrix:
 
     weights: Tensor  # (C, P) float32, P a multiple of COLUMNS
     halved: Tensor | None  # the same, `paired`, where the processor can multiply it
+    packed: Tensor | None  # the same, `amx_packed`, where there is a matrix unit
     bias: Tensor  # (P,) float32
 
     @classmethod
@@ -287,12 +289,17 @@ class PixelMatrix:
         more = -len(bias) % COLUMNS
         weights, bias = F.pad(weights, (0, more)).contiguous(), F.pad(bias, (0, more), value=_NEVER)
         can_halve = can_convolve(torch.bfloat16) and weights.shape[0] % 2 == 0
-        return cls(weights, paired(weights.unsqueeze(0)) if can_halve else None, bias)
+        can_pack = has_amx() and weights.shape[0] <= AMX_MOST_VALUES
+        halved, packed = (
+            (pack(weights.unsqueeze(0)) if can else None) for pack, can in ((paired, can_halve), (amx_packed, can_pack))
+        )
+        return cls(weights, halved, packed, bias)
 
-    def addresses(self, dtype: torch.dtype) -> tuple[int, int, int]:
+    def addresses(self, dtype: torch.dtype) -> tuple[int, int, int, int]:
         """For pixels of a type."""
-        halved = self.halved if dtype == torch.bfloat16 else None
-        return self.weights.data_ptr(), 0 if halved is None else halved.data_ptr(), self.bias.data_ptr()
+        short = dtype == torch.bfloat16
+        halved, packed = (part.data_ptr() if short and part is not None else 0 for part in (self.halved, self.packed))
+        return self.weights.data_ptr(), halved, packed, self.bias.data_ptr()
 
 
 def compact_disparity(

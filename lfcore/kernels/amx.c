@@ -9,12 +9,20 @@
 
 #define REQUEST_PERMISSION 0x1023 /* of arch_prctl, Linux 5.16 */
 #define TILE_DATA 18 /* the state for which permission is asked */
+#define MOST_PIECES 64 /* of rows that lie behind one another: AMX_MOST_VALUES in __init__.py */
 #define AMX_BITS ((1u << 22) | (1u << 24)) /* AMX-BF16, AMX-TILE */
 
 int takes_amx(void) {
     unsigned a, b, c, d;
     if (!takes_halves() || !__get_cpuid_count(7, 0, &a, &b, &c, &d) || (d & AMX_BITS) != AMX_BITS) return 0;
     return syscall(SYS_arch_prctl, REQUEST_PERMISSION, TILE_DATA) == 0;
+}
+
+/* The pieces of rows of so many values that lie behind one another. */
+PART Pieces evenly(Py_ssize_t values, Py_ssize_t *offsets) {
+    const Py_ssize_t pieces = (values + PIECE - 1) / PIECE;
+    for (Py_ssize_t piece = 0; piece < pieces; ++piece) offsets[piece] = piece * PIECE * 2;
+    return (Pieces){values * 2, offsets, pieces};
 }
 
 typedef struct {
@@ -89,7 +97,28 @@ __attribute__((target(AMX))) static void multiply_all(const Products *p, Py_ssiz
     }
 }
 
-#define MOST_PIECES 64
+__attribute__((target(AMX))) void amx_row_products(
+    const uint16_t *rows, Py_ssize_t count, Py_ssize_t values, const void *packed, Py_ssize_t groups, const float *bias,
+    uint16_t *room, float *out) {
+    _Alignas(64) float sums[4 * ROWS * COLUMNS];
+    Py_ssize_t offsets[MOST_PIECES];
+    const Pieces pieces = evenly(values, offsets);
+    /* What is read beyond the rows must be there, and zeros. */
+    memcpy(room, rows, count * values * sizeof *rows);
+    memset(room + count * values, 0, (amx_room(count, values) - count * values) * sizeof *rows);
+    const TileShapes before = begin_tiles();
+    const Py_ssize_t last = (count - 1) / ROWS;
+    for (Py_ssize_t group = 0; group < groups; ++group)
+        for (Py_ssize_t first = 0; first <= last; first += 4) {
+            const char *blocks[4];
+            for (int k = 0; k < 4; ++k) blocks[k] = (const char *)(room + at_most(first + k, last) * ROWS * values);
+            four_by_one(&pieces, blocks, (const char *)packed + group * pieces.pieces * TILE_BYTES, bias + group * COLUMNS, sums);
+            const Py_ssize_t own = at_most(4 * ROWS, count - first * ROWS);
+            for (Py_ssize_t row = 0; row < own; ++row)
+                memcpy(out + ((first * ROWS + row) * groups + group) * COLUMNS, sums + row * COLUMNS, COLUMNS * sizeof *out);
+        }
+    end_tiles(&before);
+}
 
 PyObject *amx_products(PyObject *Py_UNUSED(module), PyObject *arguments) {
     static const float zeros[2 * COLUMNS];
@@ -103,8 +132,7 @@ PyObject *amx_products(PyObject *Py_UNUSED(module), PyObject *arguments) {
     p.packed = at_address(packed);
     p.out = at_address(out);
     p.groups = (p.columns + COLUMNS - 1) / COLUMNS;
-    p.pieces = (Pieces){p.values * 2, offsets, at_most((p.values + PIECE - 1) / PIECE, MOST_PIECES)};
-    for (Py_ssize_t piece = 0; piece < p.pieces.pieces; ++piece) offsets[piece] = piece * PIECE * 2;
+    p.pieces = evenly(p.values, offsets);
     Py_BEGIN_ALLOW_THREADS
     multiply_all(&p, matrices, threads);
     Py_END_ALLOW_THREADS
@@ -114,6 +142,9 @@ PyObject *amx_products(PyObject *Py_UNUSED(module), PyObject *arguments) {
 #else
 
 int takes_amx(void) { return 0; }
+void amx_row_products(const uint16_t *Py_UNUSED(rows), Py_ssize_t Py_UNUSED(count), Py_ssize_t Py_UNUSED(values),
+                      const void *Py_UNUSED(packed), Py_ssize_t Py_UNUSED(groups), const float *Py_UNUSED(bias),
+                      uint16_t *Py_UNUSED(room), float *Py_UNUSED(out)) {}
 
 PyObject *amx_products(PyObject *Py_UNUSED(module), PyObject *Py_UNUSED(arguments)) { Py_RETURN_NOTIMPLEMENTED; }
 

@@ -18,6 +18,14 @@
 /* Whether this processor has a matrix unit, and the system lets this process use it. */
 int takes_amx(void);
 
+/* Values of the room that `amx_row_products` needs. */
+PART Py_ssize_t amx_room(Py_ssize_t count, Py_ssize_t values) { return (count + ROWS - 1) / ROWS * ROWS * values + PIECE; }
+
+/* Rows of bfloat16 by a packed matrix, plus a bias. rows: (count, values). bias: (groups * COLUMNS). room: `amx_room` values. out:
+ * (count, groups * COLUMNS). */
+void amx_row_products(const uint16_t *rows, Py_ssize_t count, Py_ssize_t values, const void *packed, Py_ssize_t groups,
+                      const float *bias, uint16_t *room, float *out);
+
 #if defined(HALVED_COMPILED) && defined(__linux__)
 #define AMX_COMPILED 1
 

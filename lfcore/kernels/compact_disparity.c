@@ -1,6 +1,6 @@
 /* The last steps of the disparity network of the small pair: scores of levels to the disparity of every pixel. */
+#include "amx.h"
 #include "compact.h"
-#include "halved.h"
 
 #define NEIGHBOURS 9
 #define SPREAD 48 /* four weights for each neighbour, filled up to whole registers */
@@ -38,6 +38,7 @@ PART void four_products(const float *const pixels[4], Py_ssize_t channels, const
 typedef struct {
     const float *weights; /* (channels, outputs), outputs a multiple of 16 */
     const uint16_t *halved; /* the same as `halved_products` wants it, or NULL where that is not to be used */
+    const void *packed; /* the same for the matrix unit, or NULL where that is not to be used */
     const float *bias; /* (outputs) */
 } Matrix;
 
@@ -54,10 +55,20 @@ typedef struct {
     float *disparity; /* (PHASES, height, width), px */
 } Disparity;
 
-/* Of row y: (width, outputs), and room for three pixels more. pixels: room for the channels of the row in float32. */
+/* Values of the room that `row_products` needs for a row of pixels, in float32 or for the matrix unit. */
+PART Py_ssize_t room_for_pixels(const Disparity *d) {
+    return at_least(d->width * d->channels, (amx_room(d->width, d->channels) + 1) / 2);
+}
+
+/* Of row y: (width, outputs), and room for three pixels more. pixels: `room_for_pixels`. */
 PART void row_products(
     const Disparity *d, Py_ssize_t y, const Matrix *matrix, Py_ssize_t outputs, float *restrict pixels, float *restrict out) {
     const Py_ssize_t w = d->width, channels = d->channels;
+    if (matrix->packed != NULL) {
+        amx_row_products((const uint16_t *)d->pixels + y * w * channels, w, channels, matrix->packed, outputs / COLUMNS,
+                         matrix->bias, (uint16_t *)pixels, out);
+        return;
+    }
     if (matrix->halved != NULL) {
         halved_products((const uint16_t *)d->pixels + y * w * channels, w, channels / 2, matrix->halved, outputs / COLUMNS,
                         matrix->bias, out);
@@ -155,7 +166,7 @@ PART void fine_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, flo
 
 MANY_PROCESSORS
 static int coarse_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
-    const Py_ssize_t pixels = d->width * d->channels, sums = (d->width + 2 * BOX) * d->outputs;
+    const Py_ssize_t pixels = room_for_pixels(d), sums = (d->width + 2 * BOX) * d->outputs;
     float *memory = malloc((pixels + sums + (d->width + 3) * d->outputs) * sizeof(float));
     if (memory == NULL) return -1;
     for (Py_ssize_t y = begin; y < end; ++y) coarse_row(d, y, memory, memory + pixels, memory + pixels + sums);
@@ -165,7 +176,7 @@ static int coarse_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
 
 MANY_PROCESSORS
 static int fine_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
-    const Py_ssize_t pixels = d->width * d->channels;
+    const Py_ssize_t pixels = room_for_pixels(d);
     float *memory = malloc((pixels + (d->width + 3) * SPREAD) * sizeof(float));
     if (memory == NULL) return -1;
     for (Py_ssize_t y = begin; y < end; ++y) fine_row(d, y, memory, memory + pixels);
@@ -188,16 +199,16 @@ static int whole_disparity(const Disparity *d, int threads) {
     return failed;
 }
 
-static Matrix matrix_at(const unsigned long long addresses[3]) {
-    return (Matrix){at_address(addresses[0]), at_address(addresses[1]), at_address(addresses[2])};
+static Matrix matrix_at(const unsigned long long a[4]) {
+    return (Matrix){at_address(a[0]), at_address(a[1]), at_address(a[2]), at_address(a[3])};
 }
 
 PyObject *compact_disparity(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Disparity d;
-    unsigned long long pixels, features, score[3], values, spread[3], coarse, disparity;
+    unsigned long long pixels, features, score[4], values, spread[4], coarse, disparity;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KK(KKK)K(KKK)KKnnnnnfpi", &pixels, &features, score, score + 1, score + 2, &values,
-                          spread, spread + 1, spread + 2, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels,
+    if (!PyArg_ParseTuple(arguments, "KK(KKKK)K(KKKK)KKnnnnnfpi", &pixels, &features, score, score + 1, score + 2, score + 3,
+                          &values, spread, spread + 1, spread + 2, spread + 3, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels,
                           &d.outputs, &d.sharpness, &d.halved, &threads))
         return NULL;
     d.pixels = at_address(pixels);
