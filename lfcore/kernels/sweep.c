@@ -36,43 +36,93 @@ PART void taps_across(const float *restrict source, const float *taps, Py_ssize_
         result[x] = ta * source[x] + tb * source[x + 1] + tc * source[x + 2] + td * source[x + 3];
 }
 
-/* Mean and deviation of one row at one level, over the inputs that count at each place. */
-PART void level_row(const Sweep *sweep, Py_ssize_t k, Py_ssize_t level, Py_ssize_t y, float *restrict moved,
-                    float *restrict shifted, float *restrict counted, float *restrict mean, float *restrict deviation) {
-    const Py_ssize_t w = sweep->columns, left = sweep->left;
-    memset(mean, 0, w * sizeof(float));
-    memset(deviation, 0, w * sizeof(float));
-    memset(counted, 0, w * sizeof(float));
+/* Columns of the window from `begin` on, `end` not included. */
+typedef struct {
+    Py_ssize_t begin, end;
+} Span;
+
+/* Where input n counts in row y at a level: an empty span at the window's beginning for nowhere. */
+PART Span counting(const Sweep *sweep, Py_ssize_t n, Py_ssize_t level, Py_ssize_t y) {
+    const int32_t *valid = sweep->valid + 4 * (n * sweep->levels + level);
+    if (y < valid[2] || y >= valid[3]) return (Span){0, 0};
+    const Py_ssize_t begin = at_least(valid[0] - sweep->left, 0), end = at_most(valid[1] - sweep->left, sweep->columns);
+    return begin < end ? (Span){begin, end} : (Span){0, 0};
+}
+
+PART Span common(Span a, Span b) {
+    const Py_ssize_t begin = at_least(a.begin, b.begin), end = at_most(a.end, b.end);
+    return begin < end ? (Span){begin, end} : (Span){0, 0};
+}
+
+/* One input's row at one level. moved: room for three more. */
+PART void shift_row(const Sweep *sweep, Py_ssize_t k, Py_ssize_t n, Py_ssize_t level, Py_ssize_t y, Span span,
+                    float *restrict moved, float *restrict result) {
+    const Py_ssize_t place = n * sweep->levels + level, count = span.end - span.begin;
+    const int32_t *whole = sweep->whole + 2 * place;
+    const float *taps = sweep->taps + 8 * place;
+    const float *picture = sweep->luma + (n * sweep->batch + k) * sweep->height * sweep->width;
+    taps_down(picture, sweep->height, sweep->width, y + whole[1] - 1, taps + 4, sweep->left + span.begin + whole[0] - 1,
+              count + 3, moved);
+    taps_across(moved, taps, count, result + span.begin);
+}
+
+#define CORNERS 4
+
+/* Mean and deviation where all of four inputs count, which is most of a picture. shifted: (CORNERS, columns). */
+PART void of_all(const float *shifted, Py_ssize_t columns, Span span, float *restrict mean, float *restrict deviation) {
+    const float *restrict a = shifted, *restrict b = a + columns, *restrict c = b + columns, *restrict d = c + columns;
+    for (Py_ssize_t x = span.begin; x < span.end; ++x) {
+        const float middle = 0.25f * ((a[x] + b[x]) + (c[x] + d[x]));
+        const float from_a = a[x] - middle, from_b = b[x] - middle, from_c = c[x] - middle, from_d = d[x] - middle;
+        mean[x] = middle;
+        deviation[x] = sqrtf(((from_a * from_a + from_b * from_b) + (from_c * from_c + from_d * from_d)) * (1.0f / 3));
+    }
+}
+
+/* The same over the inputs that count at each place, which are those in their spans. counted: room for a row. */
+PART void of_some(const Sweep *sweep, const Span *spans, const float *shifted, Span span, float *restrict counted,
+                  float *restrict mean, float *restrict deviation) {
+    for (Py_ssize_t x = span.begin; x < span.end; ++x) mean[x] = deviation[x] = counted[x] = 0.0f;
     for (Py_ssize_t n = 0; n < sweep->inputs; ++n) {
-        const Py_ssize_t place = n * sweep->levels + level;
-        const int32_t *valid = sweep->valid + 4 * place, *whole = sweep->whole + 2 * place;
-        const float *taps = sweep->taps + 8 * place;
-        if (y < valid[2] || y >= valid[3]) continue;
-        const Py_ssize_t begin = at_least(valid[0] - left, 0), end = at_most(valid[1] - left, w);
-        if (end <= begin) continue;
-        const float *picture = sweep->luma + (n * sweep->batch + k) * sweep->height * sweep->width;
-        taps_down(picture, sweep->height, sweep->width, y + whole[1] - 1, taps + 4, left + begin + whole[0] - 1, end - begin + 3,
-                  moved);
-        float *restrict here = shifted + n * w;
-        taps_across(moved, taps, end - begin, here + begin);
-        for (Py_ssize_t x = begin; x < end; ++x) {
+        const float *restrict here = shifted + n * sweep->columns;
+        const Span own = common(spans[n], span);
+        for (Py_ssize_t x = own.begin; x < own.end; ++x) {
             mean[x] += here[x];
             counted[x] += 1.0f;
         }
     }
-    for (Py_ssize_t x = 0; x < w; ++x) mean[x] /= counted[x] > 1.0f ? counted[x] : 1.0f;
+    for (Py_ssize_t x = span.begin; x < span.end; ++x) mean[x] /= counted[x] > 1.0f ? counted[x] : 1.0f;
     for (Py_ssize_t n = 0; n < sweep->inputs; ++n) {
-        const int32_t *valid = sweep->valid + 4 * (n * sweep->levels + level);
-        if (y < valid[2] || y >= valid[3]) continue;
-        const Py_ssize_t begin = at_least(valid[0] - left, 0), end = at_most(valid[1] - left, w);
-        const float *restrict here = shifted + n * w;
-        for (Py_ssize_t x = begin; x < end; ++x) {
+        const float *restrict here = shifted + n * sweep->columns;
+        const Span own = common(spans[n], span);
+        for (Py_ssize_t x = own.begin; x < own.end; ++x) {
             const float away = here[x] - mean[x];
             deviation[x] += away * away;
         }
     }
-    for (Py_ssize_t x = 0; x < w; ++x)
+    for (Py_ssize_t x = span.begin; x < span.end; ++x)
         deviation[x] = sqrtf(deviation[x] / (counted[x] > 2.0f ? counted[x] - 1.0f : 1.0f));
+}
+
+/* What a row needs while it is computed. */
+typedef struct {
+    float *moved, *counted, *shifted; /* (columns + 3), (columns), (inputs, columns) */
+    Span *spans; /* (inputs) */
+} Room;
+
+/* Mean and deviation of one row at one level. */
+PART void level_row(const Sweep *sweep, Py_ssize_t k, Py_ssize_t level, Py_ssize_t y, const Room *room, float *restrict mean,
+                    float *restrict deviation) {
+    const Py_ssize_t w = sweep->columns;
+    Span all = {0, sweep->inputs == CORNERS ? w : 0};
+    for (Py_ssize_t n = 0; n < sweep->inputs; ++n) {
+        const Span own = room->spans[n] = counting(sweep, n, level, y);
+        if (own.begin < own.end) shift_row(sweep, k, n, level, y, own, room->moved, room->shifted + n * w);
+        all = common(all, own);
+    }
+    of_some(sweep, room->spans, room->shifted, (Span){0, all.begin}, room->counted, mean, deviation);
+    of_all(room->shifted, w, all, mean, deviation);
+    of_some(sweep, room->spans, room->shifted, (Span){all.end, w}, room->counted, mean, deviation);
 }
 
 /* Rows of channels (channels, w), an even number of them, to pixels of channels. */
@@ -101,21 +151,28 @@ PART void write_whole(const float *restrict rows, Py_ssize_t channels, Py_ssize_
 MANY_PROCESSORS
 static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
     const Py_ssize_t w = sweep->columns, channels = 2 * sweep->levels;
-    float *moved = malloc(((w + 3) + w + sweep->inputs * w + channels * w) * sizeof(float));
-    if (moved == NULL) return -1;
-    float *counted = moved + w + 3, *shifted = counted + w, *rows = shifted + sweep->inputs * w;
+    const Py_ssize_t room_floats = (w + 3) + w + sweep->inputs * w;
+    float *memory = malloc((room_floats + channels * w) * sizeof(float));
+    Span *spans = malloc(sweep->inputs * sizeof(Span));
+    if (memory == NULL || spans == NULL) {
+        free(memory);
+        free(spans);
+        return -1;
+    }
+    float *rows = memory + room_floats;
+    const Room room = {memory, memory + w + 3, memory + w + 3 + w, spans};
     for (Py_ssize_t k = 0; k < sweep->batch; ++k)
         for (Py_ssize_t y = begin; y < end; ++y) {
             for (Py_ssize_t level = 0; level < sweep->levels; ++level)
-                level_row(sweep, k, level, sweep->top + y, moved, shifted, counted, rows + level * w,
-                          rows + (sweep->levels + level) * w);
+                level_row(sweep, k, level, sweep->top + y, &room, rows + level * w, rows + (sweep->levels + level) * w);
             const Py_ssize_t place = k * sweep->out_batch + y * sweep->out_row;
             if (sweep->halved)
                 write_halved(rows, channels, w, (uint16_t *)sweep->out + place, sweep->out_pixel);
             else
                 write_whole(rows, channels, w, (float *)sweep->out + place, sweep->out_pixel);
         }
-    free(moved);
+    free(memory);
+    free(spans);
     return 0;
 }
 
