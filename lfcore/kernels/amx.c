@@ -18,6 +18,21 @@ int takes_amx(void) {
     return syscall(SYS_arch_prctl, REQUEST_PERMISSION, TILE_DATA) == 0;
 }
 
+__attribute__((target(AMX))) TileShapes begin_tiles(void) {
+    TileShapes before, own = {{1}}; /* the only palette there is */
+    _tile_storeconfig(&before);
+    for (int tile = 0; tile < 8; ++tile) own.bytes[16 + 2 * tile] = 64, own.bytes[48 + tile] = ROWS;
+    _tile_loadconfig(&own);
+    return before;
+}
+
+__attribute__((target(AMX))) void end_tiles(const TileShapes *before) {
+    if (before->bytes[0])
+        _tile_loadconfig(before);
+    else
+        _tile_release();
+}
+
 /* The pieces of rows of so many values that lie behind one another. */
 PART Pieces evenly(Py_ssize_t values, Py_ssize_t *offsets) {
     const Py_ssize_t pieces = (values + PIECE - 1) / PIECE;
@@ -87,7 +102,7 @@ __attribute__((target(AMX))) static void multiply(const Products *p, Py_ssize_t 
     }
 }
 
-__attribute__((target(AMX))) static void multiply_all(const Products *p, Py_ssize_t matrices, int threads) {
+static void multiply_all(const Products *p, Py_ssize_t matrices, int threads) {
 #pragma omp parallel num_threads(threads)
     {
         const TileShapes before = begin_tiles();

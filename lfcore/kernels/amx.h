@@ -32,26 +32,14 @@ void amx_row_products(const uint16_t *rows, Py_ssize_t count, Py_ssize_t values,
 #define AMX HALVED_TARGET ",amx-tile,amx-bf16"
 #define AMX_PART static inline __attribute__((always_inline, target(AMX)))
 
-/* What a thread's matrix unit is set to. Torch's library keeps in mind what it has set, so that is put back afterwards. */
+/* What a thread's matrix unit is set to. Torch's library keeps in mind what it has set, so that is put back afterwards. A loop of
+ * OpenMP is not for the unit's instructions: some compilers make a function of it that is for the oldest processors. */
 typedef struct {
     uint8_t bytes[64];
 } TileShapes;
 
-AMX_PART TileShapes begin_tiles(void) {
-    TileShapes before;
-    _tile_storeconfig(&before);
-    TileShapes own = {{1}}; /* the only palette there is */
-    for (int tile = 0; tile < 8; ++tile) own.bytes[16 + 2 * tile] = 64, own.bytes[48 + tile] = ROWS;
-    _tile_loadconfig(&own);
-    return before;
-}
-
-AMX_PART void end_tiles(const TileShapes *before) {
-    if (before->bytes[0])
-        _tile_loadconfig(before);
-    else
-        _tile_release();
-}
+TileShapes begin_tiles(void);
+void end_tiles(const TileShapes *before);
 
 /* Where a product finds its values. */
 typedef struct {

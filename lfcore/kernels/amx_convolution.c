@@ -127,7 +127,9 @@ PART const char *block_at(const Convolution *c, const uint16_t *copy, Py_ssize_t
         }                                                                                                                      \
     }
 
-AMX_PART void convolve_band(const Convolution *c, const Pieces *pieces, Py_ssize_t first, Py_ssize_t rows, const uint16_t *copy) {
+__attribute__((target(AMX))) static void convolve_band(
+    const Convolution *c, const Pieces *pieces, Py_ssize_t first, Py_ssize_t rows, uint16_t *copy) {
+    copy_band(c, first, rows, copy);
     _Alignas(64) float sums[4 * ROWS * COLUMNS];
     const Py_ssize_t across = (c->result_width + ROWS - 1) / ROWS, blocks = rows * across;
     for (Py_ssize_t group = 0; group < c->groups; group += 2) {
@@ -154,7 +156,7 @@ static Py_ssize_t find_pieces(const Convolution *c, Py_ssize_t offsets[MOST_PIEC
     return count;
 }
 
-__attribute__((target(AMX))) static int convolve(const Convolution *c, int threads) {
+static int convolve(const Convolution *c, int threads) {
     Py_ssize_t offsets[MOST_PIECES];
     const Pieces pieces = {c->stride * c->channels * 2, offsets, find_pieces(c, offsets)};
     int failed = 0;
@@ -168,11 +170,7 @@ __attribute__((target(AMX))) static int convolve(const Convolution *c, int threa
         const TileShapes before = begin_tiles();
 #pragma omp for schedule(dynamic, 1)
         for (Py_ssize_t first = 0; first < c->result_height; first += c->band)
-            if (!failed) {
-                const Py_ssize_t rows = at_most(c->band, c->result_height - first);
-                copy_band(c, first, rows, copy);
-                convolve_band(c, &pieces, first, rows, copy);
-            }
+            if (!failed) convolve_band(c, &pieces, first, at_most(c->band, c->result_height - first), copy);
         end_tiles(&before);
         free(copy);
     }
