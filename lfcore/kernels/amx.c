@@ -18,12 +18,14 @@ int takes_amx(void) {
     return syscall(SYS_arch_prctl, REQUEST_PERMISSION, TILE_DATA) == 0;
 }
 
-__attribute__((target(AMX))) TileShapes begin_tiles(void) {
-    TileShapes before, own = {{1}}; /* the only palette there is */
-    _tile_storeconfig(&before);
-    for (int tile = 0; tile < 8; ++tile) own.bytes[16 + 2 * tile] = 64, own.bytes[48 + tile] = ROWS;
-    _tile_loadconfig(&own);
-    return before;
+/* The only palette there is; of each tile the bytes of a row, as two bytes, and the rows. A constant: gcc believes that the
+ * instruction reads 8 bytes, and would leave out what is written to the others just before. */
+#define OF_EIGHT(...) __VA_ARGS__, __VA_ARGS__, __VA_ARGS__, __VA_ARGS__, __VA_ARGS__, __VA_ARGS__, __VA_ARGS__, __VA_ARGS__
+static const TileShapes SHAPES = {{1, [16] = OF_EIGHT(64, 0), [48] = OF_EIGHT(ROWS)}};
+
+__attribute__((target(AMX))) void begin_tiles(TileShapes *before) {
+    _tile_storeconfig(before);
+    _tile_loadconfig(&SHAPES);
 }
 
 __attribute__((target(AMX))) void end_tiles(const TileShapes *before) {
@@ -105,7 +107,8 @@ __attribute__((target(AMX))) static void multiply(const Products *p, Py_ssize_t 
 static void multiply_all(const Products *p, Py_ssize_t matrices, int threads) {
 #pragma omp parallel num_threads(threads)
     {
-        const TileShapes before = begin_tiles();
+        TileShapes before;
+        begin_tiles(&before);
 #pragma omp for schedule(dynamic, 1)
         for (Py_ssize_t index = 0; index < matrices; ++index) multiply(p, index);
         end_tiles(&before);
@@ -121,7 +124,8 @@ __attribute__((target(AMX))) void amx_row_products(
     /* What is read beyond the rows must be there, and zeros. */
     memcpy(room, rows, count * values * sizeof *rows);
     memset(room + count * values, 0, (amx_room(count, values) - count * values) * sizeof *rows);
-    const TileShapes before = begin_tiles();
+    TileShapes before;
+    begin_tiles(&before);
     const Py_ssize_t last = (count - 1) / ROWS;
     for (Py_ssize_t group = 0; group < groups; ++group)
         for (Py_ssize_t first = 0; first <= last; first += 4) {

@@ -38,7 +38,7 @@ typedef struct {
     uint8_t bytes[64];
 } TileShapes;
 
-TileShapes begin_tiles(void);
+void begin_tiles(TileShapes *before);
 void end_tiles(const TileShapes *before);
 
 /* Where a product finds its values. */
@@ -48,9 +48,13 @@ typedef struct {
     Py_ssize_t pieces;
 } Pieces;
 
+/* Gcc is not told that tiles are loaded from memory: without this it might write what they are to hold after that. */
+#define WRITTEN __asm__ volatile("" ::: "memory")
+
 /* Two blocks by two groups of columns. bias: of both groups. out: (2, ROWS, 2, COLUMNS). */
 AMX_PART void two_by_two(const Pieces *p, const char *const blocks[2], const char *matrix, const float *bias, float *out) {
     const char *other = matrix + p->pieces * TILE_BYTES;
+    WRITTEN;
     _tile_loadd(0, bias, 0);
     _tile_loadd(1, bias + COLUMNS, 0);
     _tile_loadd(2, bias, 0);
@@ -70,10 +74,12 @@ AMX_PART void two_by_two(const Pieces *p, const char *const blocks[2], const cha
     _tile_stored(1, out + COLUMNS, row);
     _tile_stored(2, out + ROWS * 2 * COLUMNS, row);
     _tile_stored(3, out + ROWS * 2 * COLUMNS + COLUMNS, row);
+    WRITTEN;
 }
 
 /* Four blocks by one group. out: (4, ROWS, COLUMNS). */
 AMX_PART void four_by_one(const Pieces *p, const char *const blocks[4], const char *matrix, const float *bias, float *out) {
+    WRITTEN;
     _tile_loadd(0, bias, 0);
     _tile_loadd(1, bias, 0);
     _tile_loadd(2, bias, 0);
@@ -94,6 +100,7 @@ AMX_PART void four_by_one(const Pieces *p, const char *const blocks[4], const ch
     _tile_stored(1, out + ROWS * COLUMNS, row);
     _tile_stored(2, out + 2 * ROWS * COLUMNS, row);
     _tile_stored(3, out + 3 * ROWS * COLUMNS, row);
+    WRITTEN;
 }
 
 #endif

@@ -167,7 +167,8 @@ static int convolve(const Convolution *c, int threads) {
         uint16_t *copy = aligned_alloc(CACHE_LINE, (values + PIECE) * sizeof *copy);
         failed |= copy == NULL;
         if (!failed) memset(copy + values, 0, PIECE * sizeof *copy);
-        const TileShapes before = begin_tiles();
+        TileShapes before;
+        begin_tiles(&before);
 #pragma omp for schedule(dynamic, 1)
         for (Py_ssize_t first = 0; first < c->result_height; first += c->band)
             if (!failed) convolve_band(c, &pieces, first, at_most(c->band, c->result_height - first), copy);
