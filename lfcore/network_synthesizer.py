@@ -29,7 +29,7 @@ class NetworkSynthesizer:
 
     The mirrored border is only seen by pixels less than 12 px from the edge; inside, the result is that of
     `reference_synthesis`. Memory while it works: about 600 bytes a pixel of the picture, and for the tile in work
-    110 MB, by Fourier transforms 160 MB with their weights; in float32 twice that.
+    110 MB, by Fourier transforms 160 to 180 MB with their weights; in float32 twice that.
     """
 
     def __init__(self, model: FullModel, key: str, tuning: Tuning | None = None) -> None:
