@@ -44,12 +44,14 @@ def test_phases_are_put_together_at_their_places() -> None:
 
 
 @pytest.mark.parametrize("way", Way)
-@pytest.mark.parametrize("halves", [False, True])  # whether the processor multiplies bfloat16, where it can
+@pytest.mark.parametrize("products", ["floats", "halves", "amx"])  # the most that the processor may use for scores
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
 def test_the_disparity_is_that_of_the_model(
-    model: CompactModel, dtype: torch.dtype, halves: bool, way: Way, monkeypatch: pytest.MonkeyPatch
+    model: CompactModel, dtype: torch.dtype, products: str, way: Way, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not halves:
+    if products != "amx":
+        monkeypatch.setattr(kernels, "has_amx", lambda: False)
+    if products == "floats":
         for module in (kernels, winograds):
             monkeypatch.setattr(module, "can_convolve", lambda dtype: kernels.compiled() and dtype == torch.float32)
     torch.manual_seed(1)

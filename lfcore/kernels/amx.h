@@ -3,7 +3,7 @@
  *
  * A product takes rows of values where they lie: row i of a block of 16 begins `stride` bytes after row i - 1, and its values
  * lie in pieces of 32, each at an offset that is the same for all rows. So a convolution multiplies a picture's own pixels, and
- * nothing is gathered. Matrices are packed (`packed` in __init__.py): (groups, pieces, 16, COLUMNS, 2), zeros beyond the last
+ * nothing is gathered. Matrices are packed (`amx_packed` in __init__.py): (groups, pieces, 16, COLUMNS, 2), zeros beyond the last
  * value and column.
  */
 #ifndef LFCORE_KERNELS_AMX_H

@@ -143,7 +143,7 @@ __attribute__((target(AMX))) static void convolve_band(
     }
 }
 
-#define MOST_PIECES 512
+#define MOST_PIECES 512 /* AMX_MOST_PIECES in __init__.py */
 
 /* Kernels without gaps have the values of a row of pixels side by side; else each pixel's are taken by themselves. */
 static Py_ssize_t find_pieces(const Convolution *c, Py_ssize_t offsets[MOST_PIECES]) {
