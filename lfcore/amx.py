@@ -11,7 +11,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.kernels import AMX_MOST_PIECES, AMX_PIECE, COLUMNS, AmxKernel, amx_convolution, amx_packed, has_amx
+from lfcore.kernels import AMX_MOST_PIECES, AMX_PIECE, COLUMNS, AmxKernel, amx_convolution, amx_packed, amx_pieces, has_amx
 
 
 class AmxConvolution:
@@ -25,8 +25,7 @@ class AmxConvolution:
         outputs, _, kernel, _ = weight.shape
         self._outputs = outputs
         rows = F.pad(_runs(weight.detach(), dilation), (0, 0, 0, -_run_length(weight, dilation) % AMX_PIECE))
-        more = -outputs % COLUMNS
-        whole = torch.zeros(outputs + more)
+        whole = torch.zeros(outputs + -outputs % COLUMNS)
         if bias is not None:
             whole[:outputs] = bias.detach()
         self._kernel = AmxKernel(amx_packed(rows.flatten(0, 1).unsqueeze(0)), whole, kernel, stride, padding, dilation)
@@ -43,10 +42,9 @@ class AmxConvolution:
 
 def can_compute(weight: Tensor, dtype: torch.dtype, dilation: int = 1) -> bool:
     """Whether there is an AmxConvolution for weights (O, C, k, k) in a type."""
-    _, _, height, width = weight.shape
-    runs = height if dilation == 1 else height * width
-    pieces = runs * -(-_run_length(weight, dilation) // AMX_PIECE)
-    return height == width and dtype == torch.bfloat16 and pieces <= AMX_MOST_PIECES and has_amx()
+    _, channels, height, width = weight.shape
+    few_enough = amx_pieces(width, channels, dilation) <= AMX_MOST_PIECES
+    return height == width and dtype == torch.bfloat16 and few_enough and has_amx()
 
 
 def _run_length(weight: Tensor, dilation: int) -> int:

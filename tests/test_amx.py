@@ -13,6 +13,8 @@ from lfcore.amx import AmxConvolution, can_compute
 from lfcore.fourier import FourierConvolution
 from lfcore.kernels import AMX_MOST_PIECES, amx_packed, amx_products, amx_room, has_amx
 from lfcore.layers import DirectConvolution, Way, make_layer
+from lfcore.networks import PaperStack
+from lfcore.tuned_stack import TunedStack, Tuning
 
 
 @pytest.fixture
@@ -164,6 +166,20 @@ def test_fourier_convolutions_are_the_same_by_the_unit_and_by_torch(
     assert float(by_torch.float().std()) > 0.05
     # Sums in another order come out rounded to a neighbouring value now and then.
     assert float((by_unit.float() - by_torch.float()).abs().mean()) < 1e-3 * float(by_torch.float().std())
+
+
+@pytest.mark.usefixtures("matrix_unit")
+@pytest.mark.parametrize("tuning", [Tuning.by_fourier(torch.bfloat16, Way.AMX), Tuning(torch.bfloat16, way=Way.AMX)])
+def test_the_papers_stack_by_the_unit_is_the_stack(tuning: Tuning) -> None:
+    torch.manual_seed(10)
+    stack, features = PaperStack(24, 3), torch.randn(1, 24, 62, 73)
+    tuned = TunedStack(stack, tuning)
+    x = tuned.empty_input(62, 73)
+    x[:, :24] = features
+    with torch.inference_mode():
+        expected, found = stack(features), tuned(x)
+    # Four layers, each rounded to a part in 256.
+    assert float((found - expected).square().mean().sqrt()) < 0.03 * float(expected.std())
 
 
 @pytest.mark.usefixtures("matrix_unit")

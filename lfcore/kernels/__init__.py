@@ -240,10 +240,11 @@ class AmxKernel:
     padding: int
     dilation: int
 
-    def pieces(self, channels: int) -> int:
-        """How many pieces of channels lie under it: without gaps those of a row of pixels lie side by side."""
-        runs, run = (self.size, self.size) if self.dilation == 1 else (self.size**2, 1)
-        return runs * math.ceil(run * channels / AMX_PIECE)
+
+def amx_pieces(size: int, channels: int, dilation: int) -> int:
+    """How many pieces of channels lie under a kernel: without gaps those of a row of pixels lie side by side."""
+    runs, run = (size, size) if dilation == 1 else (size**2, 1)
+    return runs * math.ceil(run * channels / AMX_PIECE)
 
 
 def amx_convolution(x: Tensor, kernel: AmxKernel, plus: Tensor | None, out: Tensor, of_positive: bool, positive: bool) -> None:
@@ -254,7 +255,7 @@ def amx_convolution(x: Tensor, kernel: AmxKernel, plus: Tensor | None, out: Tens
     """
     assert _KERNELS is not None
     (batch, channels, height, width), (_, outputs, *size) = x.shape, out.shape
-    groups, pieces = math.ceil(outputs / COLUMNS), kernel.pieces(channels)
+    groups, pieces = math.ceil(outputs / COLUMNS), amx_pieces(kernel.size, channels, kernel.dilation)
     assert batch == 1 and pieces <= AMX_MOST_PIECES and kernel.packed.shape[1:3] == (groups, pieces)
     assert kernel.packed.is_contiguous() and kernel.bias.shape == (groups * COLUMNS,)
     lost = (kernel.size - 1) * kernel.dilation - 2 * kernel.padding
