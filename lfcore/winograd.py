@@ -18,7 +18,6 @@ from torch import Tensor
 
 from lfcore.kernels import COLUMNS, WINOGRAD_LEAST_CHANNELS, can_convolve, paired, winograd_convolution
 
-_LEAST_WORTH = 32  # channels out in float32: with fewer, the transforms cost as much as they save
 _POINTS = (-1.5, 0.5, sqrt(0.5)), (6.0, 2.0, sqrt(2.0))  # what a pair's rows are divided by, their squares, they themselves
 
 
@@ -50,7 +49,7 @@ class WinogradConvolution:
 def can_compute(weight: Tensor, dtype: torch.dtype) -> bool:
     """Whether there is a WinogradConvolution for weights (O, C, k, k) in a type."""
     outputs, inputs, *kernel = weight.shape
-    enough = dtype != torch.float32 or (inputs >= WINOGRAD_LEAST_CHANNELS and outputs >= _LEAST_WORTH)
+    enough = dtype != torch.float32 or min(inputs, outputs) >= WINOGRAD_LEAST_CHANNELS
     return kernel == [3, 3] and can_convolve(dtype) and enough
 
 

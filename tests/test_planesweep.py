@@ -15,16 +15,19 @@ def random_luma(seed: int = 0, size: tuple[int, int] = (14, 17), batch: int = 1)
     return torch.from_numpy(np.random.default_rng(seed).random((4, batch, *size)).astype(np.float32))
 
 
+def slow_sweep(luma: np.ndarray, offsets: torch.Tensor, levels: Levels, window: Window) -> np.ndarray:
+    """(4, H, W) -> (2 L, h, w), by definition."""
+    shifts, disparities = offsets.numpy().astype(np.float64), np.linspace(levels.low, levels.high, levels.count)
+    found = [slow_features(luma.astype(np.float64), shifts, 0, 0, disparity) for disparity in disparities]
+    whole = np.concatenate([np.stack(part) for part in zip(*found, strict=True)])
+    return whole[:, window.top : window.bottom, window.left : window.right]
+
+
 @pytest.mark.parametrize(("u", "v"), [(0.5, 0.5), (0.0, 1.0), (0.3, 0.85), (-0.25, 1.25)])
 def test_features_equal_a_slow_computation_by_definition(u: float, v: float) -> None:
-    luma = random_luma()
-    levels = Levels(7, -21, 21)
-    found = plane_sweep(luma, corner_offsets(u, v), levels, Window(0, 14, 0, 17))[0]
-    offsets = corner_offsets(u, v).numpy().astype(np.float64)
-    for level, disparity in enumerate(np.linspace(-21, 21, 7)):
-        mean, deviation = slow_features(luma[:, 0].numpy().astype(np.float64), offsets, 0, 0, disparity)
-        np.testing.assert_allclose(found[level], mean, atol=2e-6)
-        np.testing.assert_allclose(found[7 + level], deviation, atol=2e-6)
+    luma, levels, window = random_luma(), Levels(7, -21, 21), Window(0, 14, 0, 17)
+    found = plane_sweep(luma, corner_offsets(u, v), levels, window)[0]
+    np.testing.assert_allclose(found, slow_sweep(luma[:, 0].numpy(), corner_offsets(u, v), levels, window), atol=2e-6)
 
 
 def test_no_sample_inside_the_picture_gives_zero_and_one_gives_no_deviation() -> None:
@@ -54,12 +57,15 @@ def test_a_batch_is_its_members() -> None:
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_the_result_goes_into_the_place_it_is_given_and_nowhere_else(dtype: torch.dtype) -> None:
-    luma, levels, window = random_luma(3, (23, 37), batch=2), Levels(5, -9, 9), Window(2, 21, 1, 36)
+@pytest.mark.parametrize(("count", "columns"), [(2, 35), (5, 3), (5, 35), (8, 16), (20, 9)])
+def test_the_result_goes_into_the_place_it_is_given_and_nowhere_else(count: int, columns: int, dtype: torch.dtype) -> None:
+    """With fewer channels and pixels than are written together, as many, and numbers of them between."""
+    luma, levels, window = random_luma(3, (23, 37), batch=2), Levels(count, -9, 9), Window(2, 21, 1, 1 + columns)
     offsets = corner_offsets(0.2, 0.6)
-    expected = plane_sweep(luma, offsets, levels, window)  # (2, 10, 19, 35)
-    around = torch.full((2, 13, 25, 40), 7.0, dtype=dtype).to(memory_format=torch.channels_last)
-    place = around[:, :10, 4:23, 2:37]
+    batch = [slow_sweep(luma[:, k].numpy(), offsets, levels, window) for k in range(2)]
+    expected = torch.from_numpy(np.stack(batch)).float()  # (2, 2 count, 19, columns)
+    around = torch.full((2, 2 * count + 3, 25, 40), 7.0, dtype=dtype).to(memory_format=torch.channels_last)
+    place = around[:, : 2 * count, 4:23, 2 : 2 + columns]
     assert plane_sweep(luma, offsets, levels, window, place) is place
     coarseness = 4e-3 if dtype is torch.bfloat16 else 1e-6
     torch.testing.assert_close(place.float(), expected.to(dtype).float(), atol=coarseness, rtol=0)

@@ -63,6 +63,13 @@ PART Four four_at(const float *values) {
 typedef float Eight __attribute__((vector_size(32)));
 typedef int32_t EightWhole __attribute__((vector_size(32)));
 
+/* The lanes of two vectors that are named; those of the second are counted on from the first's. */
+#if defined(__clang__) || __GNUC__ >= 12
+#define SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+#define SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (EightWhole){__VA_ARGS__})
+#endif
+
 PART Eight eight_at(const float *values) {
     Eight eight;
     memcpy(&eight, values, sizeof eight);

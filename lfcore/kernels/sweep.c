@@ -125,34 +125,70 @@ PART void level_row(const Sweep *sweep, Py_ssize_t k, Py_ssize_t level, Py_ssize
     of_some(sweep, room->spans, room->shifted, (Span){all.end, w}, room->counted, mean, deviation);
 }
 
-/* Rows of channels (channels, w), an even number of them, to pixels of channels. */
-PART void write_halved(const float *restrict rows, Py_ssize_t channels, Py_ssize_t w, uint16_t *out, Py_ssize_t pixel) {
-    for (Py_ssize_t first = 0; first < w; first += PIXELS_AT_ONCE) {
-        const Py_ssize_t end = at_most(first + PIXELS_AT_ONCE, w);
-        for (Py_ssize_t c = 0; c < channels; c += 2) {
-            const float *restrict low = rows + c * w, *restrict high = low + w;
-            for (Py_ssize_t x = first; x < end; ++x) {
-                const uint16_t pair[2] = {(uint16_t)rounded(bits_of(low[x])), (uint16_t)rounded(bits_of(high[x]))};
-                memcpy(out + x * pixel + c, pair, sizeof pair);
-            }
+/* Eight rows of eight values to as many columns: what lay at [i][j] lies at [j][i]. */
+PART void transpose(EightWhole rows[8]) {
+    EightWhole pairs[8], fours[8];
+    for (int i = 0; i < 8; i += 2) {
+        pairs[i] = SHUFFLE(rows[i], rows[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        pairs[i + 1] = SHUFFLE(rows[i], rows[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (int i = 0; i < 8; i += 4)
+        for (int k = 0; k < 2; ++k) {
+            fours[i + 2 * k] = SHUFFLE(pairs[i + k], pairs[i + k + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+            fours[i + 2 * k + 1] = SHUFFLE(pairs[i + k], pairs[i + k + 2], 2, 3, 10, 11, 6, 7, 14, 15);
         }
+    for (int i = 0; i < 4; ++i) {
+        rows[i] = SHUFFLE(fours[i], fours[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        rows[i + 4] = SHUFFLE(fours[i], fours[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
     }
 }
 
-PART void write_whole(const float *restrict rows, Py_ssize_t channels, Py_ssize_t w, float *out, Py_ssize_t pixel) {
-    for (Py_ssize_t first = 0; first < w; first += PIXELS_AT_ONCE) {
-        const Py_ssize_t end = at_most(first + PIXELS_AT_ONCE, w);
-        for (Py_ssize_t c = 0; c < channels; ++c)
-            for (Py_ssize_t x = first; x < end; ++x) out[x * pixel + c] = rows[c * w + x];
-    }
+PART EightWhole whole_at(const float *values) {
+    EightWhole whole;
+    memcpy(&whole, values, sizeof whole);
+    return whole;
+}
+
+/* `rounded`, of eight. */
+PART EightWhole rounded_eight(EightWhole bits) { return (bits + 0x7FFF + ((bits >> 16) & 1)) >> 16 & 0xFFFF; }
+
+/* Of eight pixels a value of 32 bits each: a channel, or two that are rounded. room: floats of a row. */
+PART EightWhole values_of_row(const float *rows, Py_ssize_t room, Py_ssize_t value, Py_ssize_t x, int halved) {
+    if (!halved) return whole_at(rows + value * room + x);
+    const float *low = rows + 2 * value * room + x;
+    return rounded_eight(whole_at(low)) | rounded_eight(whole_at(low + room)) << 16;
+}
+
+/* Floats that a row of so many pixels takes: whole squares. */
+PART Py_ssize_t row_room(Py_ssize_t pixels) { return (pixels + 7) / 8 * 8; }
+
+/* Rows of channels to `w` pixels of channels, an even number of them, in squares of eight values of 32 bits; the last ones overlap
+ * those before. rows: (channels, `row_room`), at least 16 rows. out: of the first pixel; to_next: bytes to the next. */
+PART void write_pixels(const float *rows, Py_ssize_t channels, Py_ssize_t w, int halved, char *out, Py_ssize_t to_next) {
+    const Py_ssize_t values = halved ? channels / 2 : channels, side = at_most(values, 8);
+    for (Py_ssize_t first = 0; first < w; first += PIXELS_AT_ONCE)
+        for (Py_ssize_t next = 0; next < values; next += 8)
+            for (Py_ssize_t x = first; x < at_most(first + PIXELS_AT_ONCE, w); x += 8) {
+                const Py_ssize_t value = at_most(next, values - side);
+                char *place = out + x * to_next + 4 * value;
+                EightWhole square[8];
+                for (int i = 0; i < 8; ++i) square[i] = values_of_row(rows, row_room(w), value + i, x, halved);
+                transpose(square);
+                for (int i = 0; i < at_most(w - x, 8); ++i) {
+                    if (side == 8)
+                        memcpy(place + i * to_next, &square[i], sizeof square[i]);
+                    else
+                        memcpy(place + i * to_next, &square[i], 4 * side);
+                }
+            }
 }
 
 /* Rows `begin` to `end` of the window; 0, or -1 where there is no memory. */
 MANY_PROCESSORS
 static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
-    const Py_ssize_t w = sweep->columns, channels = 2 * sweep->levels;
+    const Py_ssize_t w = sweep->columns, channels = 2 * sweep->levels, of_row = row_room(w);
     const Py_ssize_t room_floats = (w + 3) + w + sweep->inputs * w;
-    float *memory = malloc((room_floats + channels * w) * sizeof(float));
+    float *memory = malloc((room_floats + at_least(channels, 16) * of_row) * sizeof(float));
     Span *spans = malloc(sweep->inputs * sizeof(Span));
     if (memory == NULL || spans == NULL) {
         free(memory);
@@ -164,12 +200,9 @@ static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
     for (Py_ssize_t k = 0; k < sweep->batch; ++k)
         for (Py_ssize_t y = begin; y < end; ++y) {
             for (Py_ssize_t level = 0; level < sweep->levels; ++level)
-                level_row(sweep, k, level, sweep->top + y, &room, rows + level * w, rows + (sweep->levels + level) * w);
-            const Py_ssize_t place = k * sweep->out_batch + y * sweep->out_row;
-            if (sweep->halved)
-                write_halved(rows, channels, w, (uint16_t *)sweep->out + place, sweep->out_pixel);
-            else
-                write_whole(rows, channels, w, (float *)sweep->out + place, sweep->out_pixel);
+                level_row(sweep, k, level, sweep->top + y, &room, rows + level * of_row, rows + (sweep->levels + level) * of_row);
+            const Py_ssize_t size = sweep->halved ? 2 : 4, place = k * sweep->out_batch + y * sweep->out_row;
+            write_pixels(rows, channels, w, sweep->halved, (char *)sweep->out + place * size, sweep->out_pixel * size);
         }
     free(memory);
     free(spans);
