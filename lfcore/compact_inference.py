@@ -56,7 +56,7 @@ class CompactInference:
             self._join = self._layer(disparity.join)
             sharpness = float(disparity.sharpness) / _MEAN_SCALE
             self._parts = parts_of(
-                Heads(_matrix(disparity.score), _matrix(disparity.spread), config.levels.values(), sharpness)
+                Heads(_matrix(disparity.score), _matrix(disparity.spread), config.levels.values(), sharpness), tuning.dtype
             )
             x_scale = torch.cat((torch.full((12,), 4.0), torch.full((48,), 10.0), torch.ones(2), torch.full((2,), 0.2)))
             order = gathered_order()
@@ -101,7 +101,7 @@ class CompactInference:
         """`prepared` corners, continued by `reach` px, warped by the phases of a disparity. offsets: (4, 2), p_i - q;
         position: (u, v)."""
         u, v = position
-        return self._parts.gathered(corners, disparity, offsets, reach, (2 * u - 1, 2 * v - 1), self.dtype)
+        return self._parts.gathered(corners, disparity, offsets, reach, (2 * u - 1, 2 * v - 1))
 
     def colour(self, gathered: Gathered, position: tuple[float, float], size: tuple[int, int]) -> Coloured:
         """The picture, (height, width) = `size`, of the warped inputs at (u, v)."""

@@ -57,7 +57,7 @@ class Parts(Protocol):
         """Hidden channels (1, C, h, w), not negative, and features of the sweep (1, 2 L, h, w) to phases (4, h, w), px."""
 
     def gathered(
-        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float], dtype: torch.dtype
+        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
     ) -> Gathered:
         """The corners warped by the phases of the disparity; offsets: (4, 2), p_i - q; position: as the network takes it."""
 
@@ -89,7 +89,8 @@ def full_size(phases: Tensor) -> Tensor:
 class CompiledParts:
     """See Parts: by lfcore.kernels."""
 
-    def __init__(self, heads: Heads) -> None:
+    def __init__(self, heads: Heads, dtype: torch.dtype) -> None:
+        self._dtype = dtype
         matrix, bias = heads.score
         self._score = PixelMatrix.of(matrix.T, bias)
         self._values = F.pad(heads.values, (0, len(self._score.bias) - len(bias)))
@@ -98,21 +99,21 @@ class CompiledParts:
 
     def prepared(self, corners: Tensor) -> Tensor:
         """(4, H, W, 4): the colours of a pixel, and one value more, side by side."""
-        return F.pad(corners.permute(0, 2, 3, 1), (0, 1)).contiguous()
+        return F.pad(corners.permute(0, 2, 3, 1), (0, 1)).to(kernels.warp_type(self._dtype)).contiguous()
 
     def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
         return kernels.compact_disparity(pixels, features, self._score, self._values, self._spread, self._sharpness)
 
     def gathered(
-        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float], dtype: torch.dtype
+        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
     ) -> Gathered:
-        return Gathered(*kernels.compact_warp(corners, disparity, offsets, reach, QUICK_A, position, dtype))
+        return Gathered(*kernels.compact_warp(corners, disparity, offsets, reach, QUICK_A, position, self._dtype))
 
     def blended(self, outputs: Tensor, straight: Tensor, warped: Tensor, nearness: Tensor, size: tuple[int, int]) -> Tensor:
         return kernels.compact_blend(outputs, straight, warped, nearness, size, (MIDDLE, RESIDUAL, TOE))
 
     def pictures(self, warped: Tensor) -> Tensor:
-        return full_size(warped[..., :3].permute(3, 4, 2, 0, 1)) + MIDDLE
+        return full_size(warped[..., :3].permute(3, 4, 2, 0, 1).float()) + MIDDLE
 
 
 def _by_neighbour(spread: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
@@ -125,8 +126,8 @@ def _by_neighbour(spread: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
 class TorchParts:
     """See Parts: by operations of torch. Scores and weights are one matrix product each, in float32."""
 
-    def __init__(self, heads: Heads) -> None:
-        self._heads = heads
+    def __init__(self, heads: Heads, dtype: torch.dtype) -> None:
+        self._heads, self._dtype = heads, dtype
 
     def prepared(self, corners: Tensor) -> Tensor:
         """As they are."""
@@ -146,13 +147,13 @@ class TorchParts:
         return weights.mul_(near).sum(1)
 
     def gathered(
-        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float], dtype: torch.dtype
+        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
     ) -> Gathered:
         """`warped` is (4, 3, 4, h, w), by input, channel and phase."""
         _, h, w = disparity.shape
         warped = _warped_phases(corners, disparity, offsets, reach)
         mean = warped.mean(0)  # (3, 4, h, w)
-        channels = torch.empty(1, GATHERED, h, w, dtype=dtype)
+        channels = torch.empty(1, GATHERED, h, w, dtype=self._dtype)
         colours = channels[0, :60].view(PHASES, 1 + INPUTS, 3, h, w)
         colours[:, 0] = mean.transpose(0, 1)
         colours[:, 1:] = (warped - mean).permute(2, 0, 1, 3, 4)
@@ -197,6 +198,6 @@ def _warped_phases(corners: Tensor, disparity: Tensor, offsets: Tensor, reach: i
     return quick_sample(corners, x, y).view(INPUTS, 3, PHASES, h, w)
 
 
-def parts_of(heads: Heads) -> Parts:
-    """The fastest way there is here."""
-    return CompiledParts(heads) if kernels.compiled() else TorchParts(heads)
+def parts_of(heads: Heads, dtype: torch.dtype) -> Parts:
+    """The fastest way there is here, for networks of a type."""
+    return CompiledParts(heads, dtype) if kernels.compiled() else TorchParts(heads, dtype)

@@ -329,8 +329,15 @@ def compact_disparity(
     matrices = (score.addresses(dtype), values.data_ptr(), spread.addresses(dtype))
     parts = (*_addresses((pixels, features)), *matrices, *_addresses((coarse, disparity)))
     sizes = (height, width, channels, levels, outputs)
-    _KERNELS.compact_disparity(*parts, *sizes, sharpness, dtype == torch.bfloat16, torch.get_num_threads())
+    halved = dtype == torch.bfloat16
+    _KERNELS.compact_disparity(*parts, *sizes, sharpness, halved, halved and can_convolve(dtype), torch.get_num_threads())
     return disparity
+
+
+def warp_type(dtype: torch.dtype) -> torch.dtype:
+    """In which `compact_warp` takes corners and returns warped inputs for networks of a type: float16, half the memory, where
+    products of bfloat16 are (processors with AVX-512), else float32."""
+    return torch.float16 if dtype == torch.bfloat16 and can_convolve(dtype) else torch.float32
 
 
 def compact_warp(
@@ -338,23 +345,25 @@ def compact_warp(
 ) -> tuple[Tensor, Tensor]:
     """The inputs warped by the phases of a disparity, and with it what lfcore.compact.CompactColour begins with.
 
-    corners: (4, H, W, 4) float32, three channels and one that does not count, continued by `reach` px beyond the edges, at
-    least two. disparity: (4, h, w) float32, px. offsets: (4, 2) float32, p_i - q. a: of the cubic kernel. position: as the
-    network takes it. Returns (1, 64, h, w) in channels_last order and of `dtype`, by phase: means and the differences from
-    them of the four inputs, three channels each; then the position, the mean disparity and how far it spreads; and the warped
-    inputs, (h, w, 4, 4, 4) by phase, input and channel, the fourth of which does not count.
+    corners: (4, H, W, 4) of `warp_type(dtype)`, three channels and one that does not count, continued by `reach` px beyond the
+    edges, at least two. disparity: (4, h, w) float32, px. offsets: (4, 2) float32, p_i - q. a: of the cubic kernel. position:
+    as the network takes it. Returns (1, 64, h, w) in channels_last order and of `dtype`, by phase: means and the differences
+    from them of the four inputs, three channels each; then the position, the mean disparity and how far it spreads; and the
+    warped inputs, (h, w, 4, 4, 4) by phase, input and channel, the fourth of which does not count, of the corners' type.
     """
     assert _KERNELS is not None
     _, height, width = disparity.shape
     assert corners.shape[0] == corners.shape[3] == 4 and min(corners.shape[1:3]) >= 4 and reach >= 2
-    assert disparity.shape[0] == 4 and offsets.shape == (4, 2)
+    assert disparity.shape[0] == 4 and offsets.shape == (4, 2) and corners.numel() < 2**31
     along_axes = offsets.T.contiguous()
-    _check((), (corners, disparity, along_axes))
+    _check((), (disparity, along_axes))
+    assert corners.is_contiguous() and corners.dtype == warp_type(dtype)
     gathered = torch.empty(1, 64, height, width, dtype=dtype, memory_format=torch.channels_last)
-    warped = torch.empty(height, width, 4, 4, 4)
+    warped = torch.empty(height, width, 4, 4, 4, dtype=corners.dtype)
     sizes = (*corners.shape[1:3], height, width, reach)
     parts = _addresses((corners, disparity, along_axes, gathered, warped))
-    _KERNELS.compact_warp(*parts, *sizes, a, *position, dtype == torch.bfloat16, torch.get_num_threads())
+    types = (dtype == torch.bfloat16, corners.dtype == torch.float16)
+    _KERNELS.compact_warp(*parts, *sizes, a, *position, *types, torch.get_num_threads())
     return gathered, warped
 
 
@@ -379,10 +388,12 @@ def compact_blend(
     assert outputs.shape[1] == 28 and straight.shape == (1, 12, height, width)
     assert warped.shape == (height, width, 4, 4, 4) and nearness.shape == (4,)
     assert size[0] <= 2 * height and size[1] <= 2 * width
-    _check((outputs, straight), (warped, nearness))
+    _check((outputs, straight), (nearness,))
+    assert warped.is_contiguous() and warped.dtype == warp_type(outputs.dtype)
     picture = torch.empty(*size, 3)
     parts = _addresses((outputs, straight, warped, nearness, picture))
-    _KERNELS.compact_blend(*parts, height, width, *size, *scales, outputs.dtype == torch.bfloat16, torch.get_num_threads())
+    types = (outputs.dtype == torch.bfloat16, warped.dtype == torch.float16)
+    _KERNELS.compact_blend(*parts, height, width, *size, *scales, *types, torch.get_num_threads())
     return picture
 
 

@@ -6,13 +6,45 @@
 #ifndef LFCORE_KERNELS_COMPACT_H
 #define LFCORE_KERNELS_COMPACT_H
 
-#include "common.h"
+#include "halved.h"
 
 typedef int32_t FourWhole __attribute__((vector_size(16)));
 typedef uint16_t EightHalves __attribute__((vector_size(16)));
 
 #define INPUTS 4
 #define PHASES 4
+#define GATHERED 64 /* channels that the colour network takes */
+#define LOGITS (INPUTS * PHASES)
+#define OUTPUTS (LOGITS + 3 * PHASES) /* that it puts out */
+
+/* Pictures that only the passes below read and write, "shortened": half-precision floats, half the memory, where they are for
+ * AVX-512 (compact_*_halved.c), else float32. */
+typedef struct {
+    const void *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
+    Py_ssize_t source_height, source_width;
+    const float *disparity; /* (PHASES, height, width), px */
+    const float *offsets; /* (2, INPUTS): what a pixel of disparity moves the place of sampling by, along x, then y */
+    Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
+    float a; /* of the cubic kernel */
+    float u, v; /* as the colour network takes them */
+    void *gathered; /* (height, width, GATHERED) */
+    int halved;
+    void *warped; /* (height, width, PHASES, INPUTS, 4) */
+    int shortened; /* whether corners and warped are */
+} Warp;
+
+typedef struct {
+    const void *outputs; /* (height, width, OUTPUTS): logits by input and phase, then the residual by phase and channel */
+    const void *straight; /* (height, width, 3 * PHASES): more of the residual */
+    int halved;
+    const void *warped; /* (height, width, PHASES, INPUTS, 4) */
+    int shortened; /* whether warped is; the rest is halved then */
+    const float *nearness; /* (INPUTS): added to the logits */
+    Py_ssize_t height, width;
+    float middle, weight, toe; /* what was taken off the warped inputs, what the residual counts, of the root tone */
+    float *picture; /* (picture_height, picture_width, 3), stored values */
+    Py_ssize_t picture_height, picture_width; /* at most twice the pixels */
+} Blend;
 
 PART void as_floats(const void *source, Py_ssize_t first, Py_ssize_t count, int halved, float *restrict out) {
     if (halved) {
@@ -53,5 +85,42 @@ PART Eight exponential(Eight x) {
     const Eight high = r * (1.0f / 24 + r * (1.0f / 120 + r * (1.0f / 720)));
     return (1.0f + r * (1.0f + r * (0.5f + r * (1.0f / 6 + high)))) * (Eight)((power + 127) << 23);
 }
+
+#ifdef HALVED_COMPILED
+
+/* The same of sixteen, to a part in 400,000. */
+HALVED_PART __m512 exponential_of_sixteen(__m512 x) {
+    const __m512 bounded = _mm512_max_ps(x, _mm512_set1_ps(-87.0f)); /* which it is where x is not a number */
+    const __m512 whole = _mm512_roundscale_ps(bounded * 1.44269504f, 0);
+    const __m512 r = (bounded - whole * 0.693359375f) + whole * 2.12194440e-4f;
+    const __m512 high = r * (1.0f / 24 + r * (1.0f / 120));
+    return _mm512_scalef_ps(1.0f + r * (1.0f + r * (0.5f + r * (1.0f / 6 + high))), whole);
+}
+
+HALVED_PART __m512 floats_at(const uint16_t *halves, __mmask16 counting) {
+    const __m512i wide = _mm512_cvtepu16_epi32(_mm256_maskz_loadu_epi16(counting, halves));
+    return _mm512_castsi512_ps(_mm512_slli_epi32(wide, 16));
+}
+
+/* The greatest of four parts of four, in each of them. */
+HALVED_PART __m512 greatest_of_parts(__m512 values) {
+    const __m512 two = _mm512_max_ps(values, _mm512_shuffle_f32x4(values, values, 0x4E));
+    return _mm512_max_ps(two, _mm512_shuffle_f32x4(two, two, 0xB1));
+}
+
+/* Four vectors of four parts of four, to the sums over the parts, one after another. */
+HALVED_PART __m512 sums_of_parts(const __m512 of[4]) {
+    const __m512 first = _mm512_shuffle_f32x4(of[0], of[1], 0x88) + _mm512_shuffle_f32x4(of[0], of[1], 0xDD);
+    const __m512 second = _mm512_shuffle_f32x4(of[2], of[3], 0x88) + _mm512_shuffle_f32x4(of[2], of[3], 0xDD);
+    return _mm512_shuffle_f32x4(first, second, 0x88) + _mm512_shuffle_f32x4(first, second, 0xDD);
+}
+
+/* The sum over four parts of four, in each of them. */
+HALVED_PART __m512 sum_of_parts(__m512 values) {
+    const __m512 two = values + _mm512_shuffle_f32x4(values, values, 0x4E);
+    return two + _mm512_shuffle_f32x4(two, two, 0xB1);
+}
+
+#endif
 
 #endif

@@ -1,20 +1,8 @@
 /* The last steps of the colour network of the small pair: weights of the inputs and a residual to the picture. */
 #include "compact.h"
 
-#define LOGITS (INPUTS * PHASES)
-#define OUTPUTS (LOGITS + 3 * PHASES)
-
-typedef struct {
-    const void *outputs; /* (height, width, OUTPUTS): logits by input and phase, then the residual by phase and channel */
-    const void *straight; /* (height, width, 3 * PHASES): more of the residual */
-    int halved;
-    const float *warped; /* (height, width, PHASES, INPUTS, 4) */
-    const float *nearness; /* (INPUTS): added to the logits */
-    Py_ssize_t height, width;
-    float middle, weight, toe; /* what was taken off the warped inputs, what the residual counts, of the root tone */
-    float *picture; /* (picture_height, picture_width, 3), stored values */
-    Py_ssize_t picture_height, picture_width; /* at most twice the pixels */
-} Blend;
+/* Rows `begin` to `end` where `warped` is shortened and `takes_halves` (compact_blend_halved.c). */
+void blend_rows_in_halves(const Blend *b, Py_ssize_t begin, Py_ssize_t end);
 
 /* The inverse of the root tone, within 0 and 1; not a number becomes 0. */
 PART float stored(float toned, float toe) {
@@ -25,7 +13,7 @@ PART float stored(float toned, float toe) {
 PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const float *nearness) {
     const Py_ssize_t pixel = y * b->width + x;
     float scores[OUTPUTS + 1], straight[3 * PHASES + 1]; /* three channels are read as four */
-    const float *residual = scores + LOGITS;
+    const float *residual = scores + LOGITS, *of_pixel = (const float *)b->warped + pixel * PHASES * INPUTS * 4;
     as_floats(b->outputs, pixel * OUTPUTS, OUTPUTS, b->halved, scores);
     as_floats(b->straight, pixel * 3 * PHASES, 3 * PHASES, b->halved, straight);
     scores[OUTPUTS] = straight[3 * PHASES] = 0.0f;
@@ -38,7 +26,7 @@ PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, const float *n
     for (int phase = 0; phase < PHASES; ++phase) {
         const Py_ssize_t row = 2 * y + phase / 2, column = 2 * x + phase % 2;
         if (row >= b->picture_height || column >= b->picture_width) continue;
-        const float *warped = b->warped + (pixel * PHASES + phase) * INPUTS * 4;
+        const float *warped = of_pixel + phase * INPUTS * 4;
         Four sum = {0.0f};
         for (int n = 0; n < INPUTS; ++n) sum += scores[PHASES * n + phase] * four_at(warped + 4 * n);
         const Four added = four_at(residual + 3 * phase) + four_at(straight + 3 * phase);
@@ -60,15 +48,16 @@ static void whole_blend(const Blend *b, int threads) {
     const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, b->height);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (Py_ssize_t part = 0; part < parts; ++part)
-        blend_rows(b, b->height * part / parts, b->height * (part + 1) / parts);
+        (b->shortened ? blend_rows_in_halves : blend_rows)(b, b->height * part / parts, b->height * (part + 1) / parts);
 }
 
 PyObject *compact_blend(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Blend b;
     unsigned long long outputs, straight, warped, nearness, picture;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnfffpi", &outputs, &straight, &warped, &nearness, &picture, &b.height, &b.width,
-                          &b.picture_height, &b.picture_width, &b.middle, &b.weight, &b.toe, &b.halved, &threads))
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnfffppi", &outputs, &straight, &warped, &nearness, &picture, &b.height, &b.width,
+                          &b.picture_height, &b.picture_width, &b.middle, &b.weight, &b.toe, &b.halved, &b.shortened,
+                          &threads))
         return NULL;
     b.outputs = at_address(outputs);
     b.straight = at_address(straight);

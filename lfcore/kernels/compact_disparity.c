@@ -1,10 +1,5 @@
 /* The last steps of the disparity network of the small pair: scores of levels to the disparity of every pixel. */
-#include "amx.h"
-#include "compact.h"
-
-#define NEIGHBOURS 9
-#define SPREAD 48 /* four weights for each neighbour, filled up to whole registers */
-#define BOX 2 /* how far the deviation around a pixel reaches */
+#include "compact_disparity.h"
 
 PART float greatest_of(Eight values) {
     float greatest = values[0];
@@ -33,27 +28,6 @@ PART void four_products(const float *const pixels[4], Py_ssize_t channels, const
         }
     }
 }
-
-/* A matrix and a bias, by which the channels of pixels are multiplied. */
-typedef struct {
-    const float *weights; /* (channels, outputs), outputs a multiple of 16 */
-    const uint16_t *halved; /* the same as `halved_products` wants it, or NULL where that is not to be used */
-    const void *packed; /* the same for the matrix unit, or NULL where that is not to be used */
-    const float *bias; /* (outputs) */
-} Matrix;
-
-typedef struct {
-    const void *pixels; /* (height, width, channels), not negative */
-    const void *features; /* (height, width, 2 levels): of the sweep, the latter half its deviations */
-    int halved;
-    Py_ssize_t height, width, channels, levels, outputs; /* outputs: the levels, filled up to a multiple of 16 */
-    Matrix score; /* what is filled up is never to be chosen */
-    const float *values; /* (outputs), px */
-    Matrix spread; /* its SPREAD outputs by neighbour, then phase */
-    float sharpness; /* how steeply a level's score falls with its deviation */
-    float *coarse; /* (height, width), px */
-    float *disparity; /* (PHASES, height, width), px */
-} Disparity;
 
 /* Values of the room that `row_products` needs for a row of pixels, in float32 or for the matrix unit. */
 PART Py_ssize_t room_for_pixels(const Disparity *d) {
@@ -118,11 +92,10 @@ PART float expected(const float *scores, const float *values, Py_ssize_t outputs
     return sum_of(sum) / sum_of(whole);
 }
 
-/* Of row y: the mean of the levels, each with a probability from its score. */
-PART void coarse_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, float *restrict sums, float *restrict scores) {
+/* Of row y: the mean of the levels, each with a probability from its score, which is changed. */
+PART void coarse_from_scores(const Disparity *d, Py_ssize_t y, float *restrict sums, float *restrict scores) {
     const Py_ssize_t w = d->width, outputs = d->outputs;
     sum_rows(d, y, sums);
-    row_products(d, y, &d->score, outputs, pixels, scores);
     const Py_ssize_t rows = at_most(y + BOX, d->height - 1) - at_least(y - BOX, 0) + 1;
     for (Py_ssize_t x = 0; x < w; ++x) {
         const Py_ssize_t columns = at_most(x + BOX, w - 1) - at_least(x - BOX, 0) + 1;
@@ -155,9 +128,8 @@ PART Four spread_out(const Disparity *d, Py_ssize_t y, Py_ssize_t x, float *rest
     return sum / whole;
 }
 
-PART void fine_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, float *restrict scores) {
+PART void phases_from_scores(const Disparity *d, Py_ssize_t y, float *restrict scores) {
     const Py_ssize_t w = d->width;
-    row_products(d, y, &d->spread, SPREAD, pixels, scores);
     for (Py_ssize_t x = 0; x < w; ++x) {
         const Four phases = spread_out(d, y, x, scores + x * SPREAD);
         for (int phase = 0; phase < PHASES; ++phase) d->disparity[(phase * d->height + y) * w + x] = phases[phase];
@@ -166,10 +138,17 @@ PART void fine_row(const Disparity *d, Py_ssize_t y, float *restrict pixels, flo
 
 MANY_PROCESSORS
 static int coarse_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
-    const Py_ssize_t pixels = room_for_pixels(d), sums = (d->width + 2 * BOX) * d->outputs;
-    float *memory = malloc((pixels + sums + (d->width + 3) * d->outputs) * sizeof(float));
+    const Py_ssize_t pixels = room_for_pixels(d);
+    float *memory = malloc((pixels + room_for_sums(d) + (d->width + 3) * d->outputs) * sizeof(float));
     if (memory == NULL) return -1;
-    for (Py_ssize_t y = begin; y < end; ++y) coarse_row(d, y, memory, memory + pixels, memory + pixels + sums);
+    float *sums = memory + pixels, *scores = sums + room_for_sums(d);
+    for (Py_ssize_t y = begin; y < end; ++y) {
+        row_products(d, y, &d->score, d->outputs, memory, scores);
+        if (d->wide)
+            coarse_of_sixteens(d, y, sums, scores);
+        else
+            coarse_from_scores(d, y, sums, scores);
+    }
     free(memory);
     return 0;
 }
@@ -177,9 +156,16 @@ static int coarse_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
 MANY_PROCESSORS
 static int fine_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
     const Py_ssize_t pixels = room_for_pixels(d);
-    float *memory = malloc((pixels + (d->width + 3) * SPREAD) * sizeof(float));
+    float *memory = malloc((pixels + room_for_coarse(d) + (d->width + 3) * SPREAD) * sizeof(float));
     if (memory == NULL) return -1;
-    for (Py_ssize_t y = begin; y < end; ++y) fine_row(d, y, memory, memory + pixels);
+    float *coarse = memory + pixels, *scores = coarse + room_for_coarse(d);
+    for (Py_ssize_t y = begin; y < end; ++y) {
+        row_products(d, y, &d->spread, SPREAD, memory, scores);
+        if (d->wide)
+            phases_of_sixteens(d, y, scores, coarse);
+        else
+            phases_from_scores(d, y, scores);
+    }
     free(memory);
     return 0;
 }
@@ -207,9 +193,9 @@ PyObject *compact_disparity(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Disparity d;
     unsigned long long pixels, features, score[4], values, spread[4], coarse, disparity;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KK(KKKK)K(KKKK)KKnnnnnfpi", &pixels, &features, score, score + 1, score + 2, score + 3,
+    if (!PyArg_ParseTuple(arguments, "KK(KKKK)K(KKKK)KKnnnnnfppi", &pixels, &features, score, score + 1, score + 2, score + 3,
                           &values, spread, spread + 1, spread + 2, spread + 3, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels,
-                          &d.outputs, &d.sharpness, &d.halved, &threads))
+                          &d.outputs, &d.sharpness, &d.halved, &d.wide, &threads))
         return NULL;
     d.pixels = at_address(pixels);
     d.features = at_address(features);

@@ -1,7 +1,5 @@
 /* The inputs of the small pair warped by its disparity, as its colour network takes them. */
-#include "compact.h"
-
-#define GATHERED 64 /* channels that the colour network takes */
+#include "compact_warp.h"
 
 PART void from_floats(const float *restrict values, Py_ssize_t count, int halved, void *out, Py_ssize_t first) {
     if (halved) {
@@ -10,19 +8,6 @@ PART void from_floats(const float *restrict values, Py_ssize_t count, int halved
     } else
         memcpy((float *)out + first, values, count * sizeof(float));
 }
-
-typedef struct {
-    const float *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
-    Py_ssize_t source_height, source_width;
-    const float *disparity; /* (PHASES, height, width), px */
-    const float *offsets; /* (2, INPUTS): what a pixel of disparity moves the place of sampling by, along x, then y */
-    Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
-    float a; /* of the cubic kernel */
-    float u, v; /* as the colour network takes them */
-    void *gathered; /* (height, width, GATHERED) */
-    int halved;
-    float *warped; /* (height, width, PHASES, INPUTS, 4) */
-} Warp;
 
 /* Along an axis, where the inputs are sampled: the first pixel of four, and what each counts. */
 typedef struct {
@@ -45,7 +30,7 @@ PART Places inner_places(Four places, Py_ssize_t size, float a) {
 
 PART Four sample_colours(const Warp *warp, int input, const Places *across, const Places *down) {
     const Py_ssize_t width = warp->source_width;
-    const float *place = warp->corners + 4 * ((input * warp->source_height + down->first[input]) * width + across->first[input]);
+    const float *place = (const float *)warp->corners + 4 * ((input * warp->source_height + down->first[input]) * width + across->first[input]);
     Four columns[4];
     for (int half = 0; half < 2; ++half) {
         const float *two = place + 8 * half;
@@ -58,30 +43,12 @@ PART Four sample_colours(const Warp *warp, int input, const Places *across, cons
     return colours;
 }
 
-/* The least or greatest (with its sign turned) disparity of the three rows around y, by column. */
-PART void widest_of_rows(const Warp *warp, Py_ssize_t y, float sign, float *restrict widest) {
-    const Py_ssize_t w = warp->width;
-    for (Py_ssize_t x = 0; x < w; ++x) widest[x] = -INFINITY;
-    for (Py_ssize_t near = at_least(y - 1, 0); near <= at_most(y + 1, warp->height - 1); ++near)
-        for (int phase = 0; phase < PHASES; ++phase) {
-            const float *restrict row = warp->disparity + (phase * warp->height + near) * w;
-            for (Py_ssize_t x = 0; x < w; ++x) widest[x] = sign * row[x] > widest[x] ? sign * row[x] : widest[x];
-        }
-}
-
-PART float widest_around(const float *widest, Py_ssize_t x, Py_ssize_t width) {
-    const float left = widest[within(x - 1, width)], right = widest[within(x + 1, width)];
-    const float sides = left > right ? left : right;
-    return sides > widest[x] ? sides : widest[x];
-}
-
-PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict greatest, float *restrict least) {
+PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict widest) {
     const Py_ssize_t w = warp->width;
     const Four offsets_x = four_at(warp->offsets), offsets_y = four_at(warp->offsets + INPUTS);
-    widest_of_rows(warp, y, 1.0f, greatest);
-    widest_of_rows(warp, y, -1.0f, least);
+    spreads_of_row(warp, y, widest);
     for (Py_ssize_t x = 0; x < w; ++x) {
-        float *restrict warped = warp->warped + (y * w + x) * PHASES * INPUTS * 4;
+        float *restrict warped = (float *)warp->warped + (y * w + x) * PHASES * INPUTS * 4;
         float gathered[GATHERED]; /* three channels are written as four; what comes after overwrites the fourth */
         float total = 0.0f;
         for (int phase = 0; phase < PHASES; ++phase) {
@@ -106,7 +73,7 @@ PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict greatest, flo
         gathered[60] = warp->u;
         gathered[61] = warp->v;
         gathered[62] = 0.25f * total;
-        gathered[63] = widest_around(greatest, x, w) + widest_around(least, x, w);
+        gathered[63] = spread_at(widest, x, w);
         from_floats(gathered, GATHERED, warp->halved, warp->gathered, (y * w + x) * GATHERED);
     }
 }
@@ -115,7 +82,7 @@ MANY_PROCESSORS
 static int warp_rows(const Warp *warp, Py_ssize_t begin, Py_ssize_t end) {
     float *widest = malloc(2 * warp->width * sizeof(float));
     if (widest == NULL) return -1;
-    for (Py_ssize_t y = begin; y < end; ++y) warp_row(warp, y, widest, widest + warp->width);
+    for (Py_ssize_t y = begin; y < end; ++y) warp_row(warp, y, widest);
     free(widest);
     return 0;
 }
@@ -125,7 +92,8 @@ static int whole_warp(const Warp *warp, int threads) {
     int failed = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(| : failed)
     for (Py_ssize_t part = 0; part < parts; ++part)
-        failed |= warp_rows(warp, warp->height * part / parts, warp->height * (part + 1) / parts);
+        failed |= (warp->shortened ? warp_rows_in_halves : warp_rows)(
+            warp, warp->height * part / parts, warp->height * (part + 1) / parts);
     return failed;
 }
 
@@ -133,9 +101,9 @@ PyObject *compact_warp(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Warp warp;
     unsigned long long corners, disparity, offsets, gathered, warped;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnfffpi", &corners, &disparity, &offsets, &gathered, &warped, &warp.source_height,
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnfffppi", &corners, &disparity, &offsets, &gathered, &warped, &warp.source_height,
                           &warp.source_width, &warp.height, &warp.width, &warp.reach, &warp.a, &warp.u, &warp.v, &warp.halved,
-                          &threads))
+                          &warp.shortened, &threads))
         return NULL;
     warp.corners = at_address(corners);
     warp.disparity = at_address(disparity);
