@@ -162,6 +162,8 @@ class _Window:
         glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
         glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
         glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+        for unused in (glfw.ALPHA_BITS, glfw.DEPTH_BITS, glfw.STENCIL_BITS):  # whose clearing costs a software rasteriser time
+            glfw.window_hint(unused, 0)
         glfw.window_hint(glfw.VISIBLE, place is None)  # a place is taken before the window is seen
         size = (place.width, place.height) if place is not None else WINDOW_SIZE
         self._window = glfw.create_window(*size, TITLE, None, None)

@@ -10,20 +10,20 @@ vec4 cubic_taps(float t) {
                 0.5 * t3 - 0.5 * t2);
 }
 
-// The picture in one layer at s, in pixels with pixel centres at whole numbers; taps beyond the edge repeat it.
+// The picture in one layer at s, in pixels with pixel centres at whole numbers; taps beyond the edge repeat it. They are sampled
+// at pixels.
 vec3 bicubic(sampler2DArray pictures, int layer, vec2 s) {
-    ivec2 last = textureSize(pictures, 0).xy - 1;
+    vec2 pixel = 1.0 / vec2(textureSize(pictures, 0).xy);
     vec2 base = floor(s);
     vec4 across = cubic_taps(s.x - base.x);
     vec4 down = cubic_taps(s.y - base.y);
-    ivec2 first = ivec2(base) - 1;
+    vec2 first = base - 0.5;
     vec3 sum = vec3(0.0);
     for (int j = 0; j < 4; ++j) {
-        int y = clamp(first.y + j, 0, last.y);
         vec3 row = vec3(0.0);
         for (int i = 0; i < 4; ++i) {
-            int x = clamp(first.x + i, 0, last.x);
-            row += across[i] * texelFetch(pictures, ivec3(x, y, layer), 0).rgb;
+            vec2 place = (first + vec2(i, j)) * pixel;
+            row += across[i] * textureLod(pictures, vec3(place, float(layer)), 0.0).rgb;
         }
         sum += down[j] * row;
     }

@@ -45,7 +45,7 @@ class Bench:
         width, height = textures.size
         textures.syntheses.write(_pixels(image), viewport=(0, 0, textures.newest, width, height, 1))
         textures.disparity_map.write(disparity)
-        textures.nearest_disparity = float(disparity.min())
+        textures.disparity_range = float(disparity.min()), float(disparity.max())
         textures.made_at = textures.newest_at = viewpoint
         textures.current.clear()
 

@@ -159,7 +159,7 @@ class Canvas:
         textures.exact.write(np.ascontiguousarray(image, np.float32))
         if disparity is not None:
             textures.disparity_map.write(np.ascontiguousarray(disparity, np.float32))
-            textures.nearest_disparity = float(disparity.min())
+            textures.disparity_range = float(disparity.min()), float(disparity.max())
             textures.made_at = viewpoint
         textures.weighed = weights is not None and disparity is not None
         if weights is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.canvas.passes import Passes
 from app.canvas.synthesized import Synthesized
-from app.canvas.textures import Picture, Textures, make_texture
+from app.canvas.textures import Picture, Textures, make_layers, make_texture
 from app.comparison import BLOCK_RANGE, Difference, Source
 from app.geometry import Point
 from app.tone import Tone
@@ -105,8 +105,7 @@ class Compared:
 
     @cached_property
     def _model_image(self) -> moderngl.TextureArray:
-        width, height = self._textures.size
-        return self._textures.context.texture_array((width, height, 1), 3, alignment=1, dtype="f4")
+        return make_layers(self._textures.context, self._textures.size, 1, 3, "f4")
 
     @cached_property
     def _map(self) -> moderngl.Texture:

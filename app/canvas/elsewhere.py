@@ -6,6 +6,7 @@ import math
 
 import moderngl
 
+from app.canvas.carrying import carrying
 from app.canvas.passes import AnyTexture, Passes, Uniform
 from app.canvas.textures import Textures
 from app.geometry import Point
@@ -31,13 +32,7 @@ def draw_elsewhere(
     assert made_at is not None
     near = made_at == textures.newest_at and math.dist(at, made_at) <= CARRIED.far
     sampled: dict[str, AnyTexture] = {"disparity_map": textures.disparity_map}
-    uniforms: dict[str, Uniform] = {
-        "made_at": made_at,
-        "nearest_disparity": textures.nearest_disparity,
-        "viewpoint": at,
-        "tile": tile,
-        "shift": shift,
-    }
+    uniforms: dict[str, Uniform] = {**carrying(textures, at), "tile": tile, "shift": shift}
     if near:
         sampled["syntheses"] = textures.syntheses
         uniforms["newest"] = textures.newest

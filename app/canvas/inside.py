@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
+from app.canvas.carrying import carrying
 from app.canvas.passes import Pass, Passes
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import Textures
@@ -63,7 +64,7 @@ class Inside:
             result.target.use()
             self._passes.get("lean_weights.frag").render(
                 {"weights": textures.weights, "disparity_map": textures.disparity_map},
-                {**self._synthesized.carrying(viewpoint), "corner_colours": CORNER_COLOURS, "contrast": contrast},
+                {**carrying(self._textures, viewpoint), "corner_colours": CORNER_COLOURS, "contrast": contrast},
             )
         else:
             disparity = self._synthesized.carry_disparity(viewpoint)

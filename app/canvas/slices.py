@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from app.canvas.carrying import carrying
 from app.canvas.frame import Target
 from app.canvas.gathered import Gathered
 from app.canvas.passes import AnyTexture, Passes, Uniform
@@ -95,14 +96,11 @@ class Slices:
     def _source(self, slicing: Slicing, axis: Point) -> tuple[dict[str, AnyTexture], dict[str, Uniform]]:
         textures = self._textures
         if not slicing.captured:
-            assert textures.made_at is not None
-            carrying: dict[str, Uniform] = {
-                "made_at": textures.made_at,
-                "nearest_disparity": textures.nearest_disparity,
+            carried = carrying(textures, slicing.viewpoint, farthest=math.inf)
+            return {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}, {
+                **carried,
                 "newest": textures.newest,
-                "viewpoint": slicing.viewpoint,
             }
-            return {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}, carrying
         gathered = self._refocused.gathered(True)
         column, row = _nearest(slicing, gathered)
         tiles: dict[str, Uniform] = {

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from app.canvas.elsewhere import draw_elsewhere
 from app.canvas.passes import Passes
-from app.canvas.textures import Picture, Textures
+from app.canvas.textures import Picture, Textures, make_layers
 from app.focusing import Focusing
 from app.geometry import Point
 from app.tone import Tone
@@ -38,7 +38,7 @@ class Stereo:
             return
         width, height = self._textures.size
         if self._exact is None:
-            self._exact = self._context.texture_array((width, height, 2), 4)
+            self._exact = make_layers(self._context, self._textures.size, 2, 4, "f1")
         for layer, each in wanted.items():
             if not _same(self._held.get(layer), each):
                 self._exact.write(each[1], viewport=(0, 0, layer, width, height, 1))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import moderngl
 
+from app.canvas.carrying import carrying
 from app.canvas.passes import AnyTexture, Passes, Uniform
 from app.canvas.textures import Picture, Textures
 from app.geometry import Point
@@ -63,7 +64,7 @@ class Synthesized:
                 "corner_views": textures.corner_views,
                 "disparity_map": textures.disparity_map,
             }
-            self._passes.toned("instant.frag", tone).render(sampled, self.carrying(viewpoint))
+            self._passes.toned("instant.frag", tone).render(sampled, carrying(self._textures, viewpoint))
         return result
 
     def carry_disparity(self, viewpoint: Point) -> moderngl.Texture:
@@ -71,7 +72,9 @@ class Synthesized:
         textures = self._textures
         if textures.made_at is not None and textures.outdated("disparity", viewpoint):
             textures.disparity_target.use()
-            self._passes.get("carry.frag").render({"disparity_map": textures.disparity_map}, self.carrying(viewpoint))
+            self._passes.get("carry.frag").render(
+                {"disparity_map": textures.disparity_map}, carrying(self._textures, viewpoint)
+            )
         return textures.disparity
 
     def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: Tone) -> Picture:
@@ -80,7 +83,7 @@ class Synthesized:
         result = textures.after
         if not result.outdated("carried", viewpoint, older, share, tone):
             return result
-        uniforms: dict[str, Uniform] = {**self.carrying(viewpoint), "newest": textures.newest}
+        uniforms: dict[str, Uniform] = {**carrying(self._textures, viewpoint), "newest": textures.newest}
         fade = "fade_none.glsl"
         if older is not None:
             fade = "fade_older.glsl"
@@ -108,10 +111,3 @@ class Synthesized:
             result.target.use()
             self._passes.get("fade.frag").render({"before": before.texture, "after": after.texture}, {"share": share})
         return result
-
-    def carrying(self, viewpoint: Point) -> dict[str, Uniform]:
-        """The uniforms of carry.glsl and the viewpoint."""
-        textures = self._textures
-        made_at = textures.made_at
-        assert made_at is not None
-        return {"made_at": made_at, "nearest_disparity": textures.nearest_disparity, "viewpoint": viewpoint}

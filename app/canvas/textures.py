@@ -57,18 +57,17 @@ class Textures:
         self.context = context
         self.picture_type = picture_type
         self.size: Size = (width, height)
-        self.corner_views = context.texture_array(
-            (width, height, len(CORNERS)), 3, np.ascontiguousarray(corners).tobytes(), alignment=1, dtype=stored
-        )
-        self.captured = context.texture_array((width, height, 1), 3, alignment=1, dtype=stored)
-        self.exact = context.texture_array((width, height, 1), 3, alignment=1, dtype="f4")  # the newest synthesis
-        self.syntheses = context.texture_array((width, height, 2), 4)  # the newest one and the one before, in 8 bits
+        self.corner_views = make_layers(context, self.size, len(CORNERS), 3, stored, np.ascontiguousarray(corners).tobytes())
+        self.captured = make_layers(context, self.size, 1, 3, stored)
+        self.exact = make_layers(context, self.size, 1, 3, "f4")  # the newest synthesis
+        self.syntheses = make_layers(context, self.size, 2, 4, "f1")  # the newest one and the one before, in 8 bits
         self.newest = 0  # layer of `syntheses`
         self.newest_at: Point | None = None  # viewpoint of the newest synthesis
         self.older_at: Point | None = None
         self.disparity_map = make_texture(context, self.size, 1, "f4")
+        self.disparity_map.filter = _AT_PIXELS
         self.made_at: Point | None = None  # viewpoint of disparity_map
-        self.nearest_disparity = 0.0
+        self.disparity_range = 0.0, 0.0  # the smallest and the greatest of the map
         self.weighed = False  # whether these are of the newest synthesis
         self.disparity = make_texture(context, self.size, 1, "f4")
         self.disparity_target = context.framebuffer([self.disparity])
@@ -116,6 +115,19 @@ class Textures:
         for value in vars(self).values():
             if isinstance(value, moderngl.Framebuffer | moderngl.Texture | moderngl.TextureArray | Picture):
                 value.release()
+
+
+_AT_PIXELS = (moderngl.NEAREST, moderngl.NEAREST)
+
+
+def make_layers(
+    context: moderngl.Context, size: Size, layers: int, components: int, dtype: str, pixels: bytes | None = None
+) -> moderngl.TextureArray:
+    """Pictures of one size that are sampled at pixels, as bicubic.glsl does, and not repeated."""
+    made = context.texture_array((*size, layers), components, pixels, alignment=1, dtype=dtype)
+    made.filter = _AT_PIXELS
+    made.repeat_x = made.repeat_y = False
+    return made
 
 
 def make_texture(context: moderngl.Context, size: Size, components: int, dtype: str) -> moderngl.Texture:

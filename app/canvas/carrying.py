@@ -1,0 +1,26 @@
+"""How the newest disparity map is carried to other viewpoints (shaders/carry.glsl)."""
+
+from __future__ import annotations
+
+import math
+
+from app.canvas.passes import Uniform
+from app.canvas.textures import Textures
+from app.geometry import Point
+
+# How often a disparity is looked up again where it led to, while nothing moves by more px than that. More would show another
+# picture for hardly a pixel, or none (docs/speed.md).
+_STEPS = ((1.0, 0), (2.0, 1))
+_MOST_STEPS = 3
+
+
+def carrying(textures: Textures, viewpoint: Point, farthest: float | None = None) -> dict[str, Uniform]:
+    """The uniforms of carry.glsl, and the viewpoint. farthest: how far from the map's own viewpoint it is carried, of the
+    baseline, if not to `viewpoint`. There must be a map."""
+    made_at = textures.made_at
+    assert made_at is not None
+    nearest, greatest = textures.disparity_range
+    distance = math.dist(made_at, viewpoint) if farthest is None else farthest
+    reach = distance * (greatest - nearest)
+    steps = next((steps for most, steps in _STEPS if reach <= most), _MOST_STEPS)
+    return {"made_at": made_at, "nearest_disparity": nearest, "steps": steps, "viewpoint": viewpoint}
