@@ -265,7 +265,7 @@ def amx_convolution(x: Tensor, kernel: AmxKernel, plus: Tensor | None, out: Tens
     _check((x, out) if plus is None else (x, out, plus), (kernel.bias,))
     addresses = (*_addresses((x, kernel.packed, kernel.bias)), 0 if plus is None else plus.data_ptr(), out.data_ptr())
     shape = (kernel.size, kernel.stride, kernel.padding, kernel.dilation)
-    sizes = (height, width, channels, *shape, groups, outputs, *size)
+    sizes = (height, width, channels, *shape, outputs, *size)
     _KERNELS.amx_convolution(*addresses, *sizes, of_positive, positive, torch.get_num_threads())
 
 

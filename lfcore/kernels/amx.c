@@ -45,63 +45,21 @@ PART Pieces evenly(Py_ssize_t values, Py_ssize_t *offsets) {
 typedef struct {
     const char *rows; /* (matrices, count, values), bfloat16, and a block more after the last */
     const char *packed; /* (matrices, groups, pieces, 16, COLUMNS, 2) */
+    const float *zeros; /* (groups * COLUMNS) */
     uint16_t *out; /* (matrices, count, columns) */
-    const float *zeros; /* 2 * COLUMNS of them */
     Py_ssize_t count, values, columns, groups;
     Pieces pieces;
 } Products;
 
-/* Rows of a block to `out`, where they count. from: floats from one row of the block to the next, `width` of which count. */
-AMX_PART void put_rows(const float *block, Py_ssize_t rows, int from, Py_ssize_t width, uint16_t *out, Py_ssize_t to) {
-    const __mmask16 first = width >= COLUMNS ? 0xFFFF : (__mmask16)((1u << width) - 1);
-    const __mmask16 second = width >= 2 * COLUMNS ? 0xFFFF : width > COLUMNS ? (__mmask16)((1u << (width - COLUMNS)) - 1) : 0;
-    for (Py_ssize_t row = 0; row < rows; ++row) {
-        _mm256_mask_storeu_epi16(out + row * to, first, (__m256i)_mm512_cvtneps_pbh(_mm512_loadu_ps(block + row * from)));
-        if (second)
-            _mm256_mask_storeu_epi16(out + row * to + COLUMNS, second,
-                                     (__m256i)_mm512_cvtneps_pbh(_mm512_loadu_ps(block + row * from + COLUMNS)));
-    }
-}
-
-AMX_PART void multiply_two_groups(const Products *p, const char *rows, const char *matrix, uint16_t *out, Py_ssize_t width) {
-    _Alignas(64) float products[2 * ROWS * 2 * COLUMNS];
-    const Py_ssize_t bytes = ROWS * p->values * 2;
-    for (Py_ssize_t row = 0; row < p->count; row += 2 * ROWS) {
-        /* Of an odd number of blocks the last one is computed twice. */
-        const int both = row + ROWS < p->count;
-        const char *const blocks[2] = {rows + row / ROWS * bytes, rows + (row / ROWS + both) * bytes};
-        two_by_two(&p->pieces, blocks, matrix, p->zeros, products);
-        for (int block = 0; block <= both; ++block)
-            put_rows(products + block * ROWS * 2 * COLUMNS, at_most(ROWS, p->count - row - block * ROWS), 2 * COLUMNS, width,
-                     out + (row + block * ROWS) * p->columns, p->columns);
-    }
-}
-
-AMX_PART void multiply_one_group(const Products *p, const char *rows, const char *matrix, uint16_t *out, Py_ssize_t width) {
-    _Alignas(64) float products[4 * ROWS * COLUMNS];
-    const Py_ssize_t last = (p->count - 1) / ROWS;
-    for (Py_ssize_t first = 0; first <= last; first += 4) {
-        const char *blocks[4];
-        for (int block = 0; block < 4; ++block) blocks[block] = rows + at_most(first + block, last) * ROWS * p->values * 2;
-        four_by_one(&p->pieces, blocks, matrix, p->zeros, products);
-        for (int block = 0; block < 4 && first + block <= last; ++block)
-            put_rows(products + block * ROWS * COLUMNS, at_most(ROWS, p->count - (first + block) * ROWS), COLUMNS, width,
-                     out + (first + block) * ROWS * p->columns, p->columns);
-    }
+/* Blocks of `count` rows that lie behind one another. */
+PART Blocks blocks_behind(const void *rows, Py_ssize_t count, Py_ssize_t values) {
+    return (Blocks){rows, (count + ROWS - 1) / ROWS, 1, ROWS * values * 2, 0};
 }
 
 __attribute__((target(AMX))) static void multiply(const Products *p, Py_ssize_t index) {
-    const char *rows = p->rows + index * p->count * p->values * 2;
-    const Py_ssize_t of_group = p->pieces.pieces * TILE_BYTES;
-    const char *matrix = p->packed + index * p->groups * of_group;
-    uint16_t *out = p->out + index * p->count * p->columns;
-    for (Py_ssize_t group = 0; group < p->groups; group += 2) {
-        const Py_ssize_t column = group * COLUMNS, width = p->columns - column;
-        if (group + 1 < p->groups)
-            multiply_two_groups(p, rows, matrix + group * of_group, out + column, width);
-        else
-            multiply_one_group(p, rows, matrix + group * of_group, out + column, width);
-    }
+    const Blocks blocks = blocks_behind(p->rows + index * p->count * p->values * 2, p->count, p->values);
+    const Result result = {p->out + index * p->count * p->columns, NULL, p->count, p->columns, NULL, 0};
+    multiply_blocks(&blocks, &p->pieces, p->packed + index * p->groups * p->pieces.pieces * TILE_BYTES, p->zeros, &result);
 }
 
 static void multiply_all(const Products *p, Py_ssize_t matrices, int threads) {
@@ -118,30 +76,21 @@ static void multiply_all(const Products *p, Py_ssize_t matrices, int threads) {
 __attribute__((target(AMX))) void amx_row_products(
     const uint16_t *rows, Py_ssize_t count, Py_ssize_t values, const void *packed, Py_ssize_t groups, const float *bias,
     uint16_t *room, float *out) {
-    _Alignas(64) float sums[4 * ROWS * COLUMNS];
     Py_ssize_t offsets[MOST_PIECES];
     const Pieces pieces = evenly(values, offsets);
     /* What is read beyond the rows must be there, and zeros. */
     memcpy(room, rows, count * values * sizeof *rows);
     memset(room + count * values, 0, (amx_room(count, values) - count * values) * sizeof *rows);
+    const Blocks blocks = blocks_behind(room, count, values);
+    const Result result = {NULL, out, count, groups * COLUMNS, NULL, 0};
     TileShapes before;
     begin_tiles(&before);
-    const Py_ssize_t last = (count - 1) / ROWS;
-    for (Py_ssize_t group = 0; group < groups; ++group)
-        for (Py_ssize_t first = 0; first <= last; first += 4) {
-            const char *blocks[4];
-            for (int k = 0; k < 4; ++k) blocks[k] = (const char *)(room + at_most(first + k, last) * ROWS * values);
-            four_by_one(&pieces, blocks, (const char *)packed + group * pieces.pieces * TILE_BYTES, bias + group * COLUMNS, sums);
-            const Py_ssize_t own = at_most(4 * ROWS, count - first * ROWS);
-            for (Py_ssize_t row = 0; row < own; ++row)
-                memcpy(out + ((first * ROWS + row) * groups + group) * COLUMNS, sums + row * COLUMNS, COLUMNS * sizeof *out);
-        }
+    multiply_blocks(&blocks, &pieces, packed, bias, &result);
     end_tiles(&before);
 }
 
 PyObject *amx_products(PyObject *Py_UNUSED(module), PyObject *arguments) {
-    static const float zeros[2 * COLUMNS];
-    Products p = {.zeros = zeros};
+    Products p;
     unsigned long long rows, packed, out;
     Py_ssize_t matrices, offsets[MOST_PIECES];
     int threads;
@@ -152,9 +101,13 @@ PyObject *amx_products(PyObject *Py_UNUSED(module), PyObject *arguments) {
     p.out = at_address(out);
     p.groups = (p.columns + COLUMNS - 1) / COLUMNS;
     p.pieces = evenly(p.values, offsets);
+    float *zeros = calloc(p.groups * COLUMNS, sizeof *zeros);
+    if (zeros == NULL) return PyErr_NoMemory();
+    p.zeros = zeros;
     Py_BEGIN_ALLOW_THREADS
     multiply_all(&p, matrices, threads);
     Py_END_ALLOW_THREADS
+    free(zeros);
     Py_RETURN_NONE;
 }
 

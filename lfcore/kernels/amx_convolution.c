@@ -10,7 +10,6 @@ typedef struct {
     Py_ssize_t kernel, stride, padding, dilation; /* px along both axes; px of zeros around the picture */
     int of_positive; /* whether negative values of the picture count as 0 */
     const char *packed; /* (groups, pieces, 16, COLUMNS, 2) */
-    Py_ssize_t groups;
     const float *bias; /* (groups * COLUMNS) */
     const uint16_t *added; /* to the result, a picture like it, or NULL */
     uint16_t *out; /* (result height, result width, outputs) */
@@ -70,77 +69,15 @@ HALVED_PART void copy_band(const Convolution *c, Py_ssize_t first, Py_ssize_t ba
     }
 }
 
-HALVED_PART __m512 floats_of(__m256i halves) {
-    return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(halves), 16));
-}
-
-/* What comes after the sums of sixteen channels of a pixel. */
-HALVED_PART __m512 finished(const Convolution *c, __m512 sums, __m256i added) {
-    if (c->added != NULL) sums = _mm512_add_ps(sums, floats_of(added));
-    return c->positive ? _mm512_max_ps(sums, _mm512_setzero_ps()) : sums;
-}
-
-/* The first `count` pixels of a block to the result, of which `place` is the first value: of a group of channels, those that
- * count. */
-HALVED_PART void put_group(const Convolution *c, const float *sums, Py_ssize_t count, Py_ssize_t place, __mmask16 counting) {
-    for (Py_ssize_t pixel = 0; pixel < count; ++pixel, sums += COLUMNS, place += c->outputs) {
-        const __m256i added = c->added == NULL ? _mm256_setzero_si256() : _mm256_maskz_loadu_epi16(counting, c->added + place);
-        const __m512 values = finished(c, _mm512_loadu_ps(sums), added);
-        _mm256_mask_storeu_epi16(c->out + place, counting, (__m256i)_mm512_cvtneps_pbh(values));
-    }
-}
-
-/* The same of two groups side by side. */
-HALVED_PART void put_two_groups(
-    const Convolution *c, const float *sums, Py_ssize_t count, Py_ssize_t place, __mmask32 counting) {
-    for (Py_ssize_t pixel = 0; pixel < count; ++pixel, sums += 2 * COLUMNS, place += c->outputs) {
-        const __m512i added = c->added == NULL ? _mm512_setzero_si512() : _mm512_maskz_loadu_epi16(counting, c->added + place);
-        const __m512 low = finished(c, _mm512_loadu_ps(sums), _mm512_castsi512_si256(added));
-        const __m512 high = finished(c, _mm512_loadu_ps(sums + COLUMNS), _mm512_extracti64x4_epi64(added, 1));
-        _mm512_mask_storeu_epi16(c->out + place, counting, (__m512i)_mm512_cvtne2ps_pbh(high, low));
-    }
-}
-
-/* The lanes that count where so many channels are left. */
-PART uint32_t lanes(Py_ssize_t channels, int most) {
-    return (uint32_t)((UINT64_C(1) << at_most(channels, most)) - 1);
-}
-
-/* Where in a band's copy a block begins. */
-PART const char *block_at(const Convolution *c, const uint16_t *copy, Py_ssize_t row, Py_ssize_t column) {
-    return (const char *)(copy + row * c->stride * values_of_row(c) + column * c->stride * c->channels);
-}
-
-/* `together` blocks by `groups` groups, as constants; of the last ones some are computed again. */
-#define EACH_BLOCK(together, groups, product, put)                                                                             \
-    for (Py_ssize_t block = 0; block < blocks; block += (together)) {                                                          \
-        const char *places[together];                                                                                          \
-        for (int k = 0; k < (together); ++k) {                                                                                 \
-            const Py_ssize_t own = at_most(block + k, blocks - 1);                                                             \
-            places[k] = block_at(c, copy, own / across, own % across * ROWS);                                                  \
-        }                                                                                                                      \
-        product(pieces, places, matrix, c->bias + group * COLUMNS, sums);                                                      \
-        for (int k = 0; k < at_most(together, blocks - block); ++k) {                                                          \
-            const Py_ssize_t column = (block + k) % across * ROWS, pixel = (first + (block + k) / across) * c->result_width;   \
-            put(c, sums + k * ROWS * (groups)*COLUMNS, at_most(ROWS, c->result_width - column),                                \
-                (pixel + column) * c->outputs + group * COLUMNS, counting);                                                    \
-        }                                                                                                                      \
-    }
-
 __attribute__((target(AMX))) static void convolve_band(
     const Convolution *c, const Pieces *pieces, Py_ssize_t first, Py_ssize_t rows, uint16_t *copy) {
     copy_band(c, first, rows, copy);
-    _Alignas(64) float sums[4 * ROWS * COLUMNS];
-    const Py_ssize_t across = (c->result_width + ROWS - 1) / ROWS, blocks = rows * across;
-    for (Py_ssize_t group = 0; group < c->groups; group += 2) {
-        const char *matrix = c->packed + group * pieces->pieces * TILE_BYTES;
-        const uint32_t counting = lanes(c->outputs - group * COLUMNS, 2 * COLUMNS);
-        if (group + 1 < c->groups) {
-            EACH_BLOCK(2, 2, two_by_two, put_two_groups)
-        } else {
-            EACH_BLOCK(4, 1, four_by_one, put_group)
-        }
-    }
+    const Blocks blocks = {(const char *)copy, (c->result_width + ROWS - 1) / ROWS, rows, ROWS * c->stride * c->channels * 2,
+                           c->stride * values_of_row(c) * 2};
+    const Py_ssize_t place = first * c->result_width * c->outputs;
+    const uint16_t *added = c->added == NULL ? NULL : c->added + place;
+    const Result result = {c->out + place, NULL, c->result_width, c->outputs, added, c->positive};
+    multiply_blocks(&blocks, pieces, c->packed, c->bias, &result);
 }
 
 #define MOST_PIECES 512 /* AMX_MOST_PIECES in __init__.py */
@@ -182,8 +119,8 @@ PyObject *amx_convolution(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Convolution c = {0};
     unsigned long long in, packed, bias, added, out;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnnppi", &in, &packed, &bias, &added, &out, &c.height, &c.width, &c.channels,
-                          &c.kernel, &c.stride, &c.padding, &c.dilation, &c.groups, &c.outputs, &c.result_height,
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnppi", &in, &packed, &bias, &added, &out, &c.height, &c.width, &c.channels,
+                          &c.kernel, &c.stride, &c.padding, &c.dilation, &c.outputs, &c.result_height,
                           &c.result_width, &c.of_positive, &c.positive, &threads))
         return NULL;
     c.in = at_address(in);
