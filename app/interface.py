@@ -80,6 +80,12 @@ class Interface:
         """Whether drawing takes cores that a synthesis wants."""
         return self.in_software and self.controller.synthesizing
 
+    @property
+    def may_explain(self) -> bool:
+        """Whether a tooltip may appear where the mouse is: over the picture there is none, and frames would take cores from
+        the networks just when the hand has come to rest."""
+        return self.controller.state.cursor is None
+
     def set_scale(self, scale: float) -> None:
         """Go to another content scale of text, unless the person has chosen one."""
         scale = self.controller.state.desk.scale or scale

@@ -304,7 +304,7 @@ class _Window:
         for due_in in (self._at_hand.next_frame_in, self._at_hand.surroundings.next_frame_in):
             if due_in is not None:
                 waits.append(max(due_in, to_next_frame))
-        if now - self._touched_at < _HOVER_SECONDS:
+        if now - self._touched_at < _HOVER_SECONDS and self._at_hand.may_explain:
             waits.append(_HOVER_INTERVAL)
         if imgui.get_io().want_text_input:
             waits.append(_CARET_INTERVAL)
