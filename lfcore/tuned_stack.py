@@ -17,6 +17,7 @@ from lfcore.planesweep import Window
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
 HiddenLayer = Callable[[Tensor, Callable[[], None]], Tensor]  # of a picture, and what is called now and then
+_FEW_CHANNELS = 32  # in: of so few, the matrix unit computes large kernels directly in half of Fourier transforms' time
 _STEP = 16  # widths that are multiples of it suit the blocks in which convolutions are computed
 
 
@@ -30,6 +31,7 @@ class Tuning:
     tile_pixels: int = TILE_PIXELS
     way: Way = Way.TORCH  # in which convolutions are computed, those of the small pair too
     # Whether Fourier transforms (lfcore.fourier) are the way of larger kernels than 3 x 3, and of those where `way` is torch's.
+    # Large kernels of few channels are the matrix unit's where it is `way`.
     fourier: bool = False
 
     @classmethod
@@ -137,7 +139,8 @@ def _tuned(layer: nn.Conv2d, tuning: Tuning) -> HiddenLayer:
     """The layer with its ReLU."""
     assert layer.bias is not None
     plain = make_layer(layer.weight, layer.bias, tuning.dtype, tuning.way)
-    if tuning.fourier and (layer.kernel_size != (3, 3) or isinstance(plain, DirectConvolution)):
+    small = layer.kernel_size == (3, 3) or layer.in_channels <= _FEW_CHANNELS and tuning.way is Way.AMX
+    if tuning.fourier and (isinstance(plain, DirectConvolution) or not small):
         return FourierConvolution(layer, tuning.dtype)
 
     def computed(x: Tensor, check: Callable[[], None]) -> Tensor:
