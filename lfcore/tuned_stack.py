@@ -139,7 +139,7 @@ def _tuned(layer: nn.Conv2d, tuning: Tuning) -> HiddenLayer:
     """The layer with its ReLU."""
     assert layer.bias is not None
     plain = make_layer(layer.weight, layer.bias, tuning.dtype, tuning.way)
-    small = layer.kernel_size == (3, 3) or layer.in_channels <= _FEW_CHANNELS and tuning.way is Way.AMX
+    small = layer.kernel_size == (3, 3) or (layer.in_channels <= _FEW_CHANNELS and tuning.way is Way.AMX)
     if tuning.fourier and (isinstance(plain, DirectConvolution) or not small):
         return FourierConvolution(layer, tuning.dtype)
 
