@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import cached_property
-from typing import cast
 
 import torch
 import torch.nn.functional as F
@@ -18,6 +16,7 @@ from lfcore.compact_parts import Gathered, full_size
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
+from lfcore.synthesis import LateSynthesis
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
 from lfcore.tuned_stack import Tuning
@@ -120,18 +119,3 @@ class CompactSynthesizer:
         with torch.inference_mode():
             inputs = self._networks.warped_pictures(gathered)[..., :height, :width]
             return picture(stored_from_root(inputs).clamp_(0, 1))
-
-
-class LateSynthesis(Synthesis):
-    """A Synthesis whose warped inputs are computed when they are first asked for."""
-
-    def with_warped(self, compute: Callable[[], FloatArray]) -> LateSynthesis:
-        """Itself, with a way to the warped inputs in place of the field."""
-        self.__dict__["_compute"] = compute
-        del self.__dict__["warped"]  # so that the property below is asked, once
-        return self
-
-    @cached_property
-    def warped(self) -> FloatArray:
-        """(4, H, W, 3)."""
-        return cast(FloatArray, self.__dict__["_compute"]())

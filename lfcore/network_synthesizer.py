@@ -15,6 +15,7 @@ from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
 from lfcore.networks import BORDER, FullModel, colour_features, sweep_luminance
 from lfcore.planesweep import Window, plane_sweep
+from lfcore.synthesis import LateSynthesis
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture, put
 from lfcore.tuned_stack import TunedStack, Tuning
 from lfcore.tuning import machine_tuning
@@ -80,9 +81,9 @@ class NetworkSynthesizer:
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._colour(self._colour.tile_input(h, tile), check))
             clock.lap("colour")
-        return Synthesis(
-            u, v, self.name, picture(image[0].clamp_(0, 1)), disparity[0, 0].numpy(), picture(warped), clock.timings()
-        )
+        seen = picture(image[0].clamp_(0, 1))
+        synthesis = LateSynthesis(u, v, self.name, seen, disparity[0, 0].numpy(), None, clock.timings())
+        return synthesis.with_warped(lambda: picture(warped))
 
 
 def _continued_at_edges(corners: Tensor, disparity: Tensor, offsets: Tensor, warped: Tensor) -> Tensor:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import cached_property
+from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,21 @@ class Synthesis:
     warped: FloatArray | None  # (4, H, W, 3) in the order of CORNERS
     timings: Mapping[str, float]  # seconds by stage: features, disparity, warp, colour, total
     weights: ByteArray | None = None  # (4, H, W), the inputs' shares in the image, 255 = whole; only where asked for
+
+
+class LateSynthesis(Synthesis):
+    """A Synthesis whose warped inputs are computed when they are first asked for."""
+
+    def with_warped(self, compute: Callable[[], FloatArray]) -> LateSynthesis:
+        """Itself, with a way to the warped inputs in place of the field."""
+        self.__dict__["_compute"] = compute
+        del self.__dict__["warped"]  # so that the property below is asked, once
+        return self
+
+    @cached_property
+    def warped(self) -> FloatArray:
+        """(4, H, W, 3)."""
+        return cast(FloatArray, self.__dict__["_compute"]())
 
 
 def never() -> bool:
