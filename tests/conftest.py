@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +13,9 @@ from virtual_screen import VirtualScreen, require_tools, virtual_screen
 
 # A software context, so that the tests see the same pictures on every machine.
 os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
+
+# Where the tests are a background job of a script, Ctrl-C is ignored, also by the programs that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -188,5 +188,8 @@ def test_ctrl_c_leaves_no_half_file(tmp_path: Path) -> None:
         time.sleep(0.05)
         assert len(list(tmp_path.iterdir())) == 1  # the temporary file
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=10) != 0
+        try:
+            assert process.wait(timeout=10) != 0
+        finally:
+            process.kill()  # else the end of this block would wait for one that went on
     assert list(tmp_path.iterdir()) == []

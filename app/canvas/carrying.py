@@ -8,9 +8,9 @@ from app.canvas.passes import Uniform
 from app.canvas.textures import Textures
 from app.geometry import Point
 
-# How often a disparity is looked up again where it led to, while nothing moves by more px than that. More would show another
-# picture for hardly a pixel, or none (docs/speed.md).
-_STEPS = ((1.0, 0), (2.0, 1))
+# How often a disparity is looked up again where it led to, while nothing moves by more px than that. Within half a pixel it
+# leads to the pixel itself; up to one, more would show another picture for hardly a pixel (docs/speed.md).
+_STEPS = ((0.5, 0), (1.0, 1))
 _MOST_STEPS = 3
 
 
@@ -21,6 +21,6 @@ def carrying(textures: Textures, viewpoint: Point, farthest: float | None = None
     assert made_at is not None
     nearest, greatest = textures.disparity_range
     distance = math.dist(made_at, viewpoint) if farthest is None else farthest
-    reach = distance * (greatest - nearest)
+    reach = distance * max(abs(nearest), abs(greatest))
     steps = next((steps for most, steps in _STEPS if reach <= most), _MOST_STEPS)
     return {"made_at": made_at, "nearest_disparity": nearest, "steps": steps, "viewpoint": viewpoint}

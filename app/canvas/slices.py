@@ -96,11 +96,8 @@ class Slices:
     def _source(self, slicing: Slicing, axis: Point) -> tuple[dict[str, AnyTexture], dict[str, Uniform]]:
         textures = self._textures
         if not slicing.captured:
-            carried = carrying(textures, slicing.viewpoint, farthest=math.inf)
-            return {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}, {
-                **carried,
-                "newest": textures.newest,
-            }
+            uniforms = {**carrying(textures, slicing.viewpoint, farthest=math.inf), "newest": textures.newest}
+            return {"syntheses": textures.syntheses, "disparity_map": textures.disparity_map}, uniforms
         gathered = self._refocused.gathered(True)
         column, row = _nearest(slicing, gathered)
         tiles: dict[str, Uniform] = {

@@ -139,13 +139,6 @@ typedef struct {
     uint32_t counting; /* which of the groups' columns lie within it */
 } Pending;
 
-/* The lanes that count where so many columns are left. */
-PART uint32_t lanes_within(Py_ssize_t columns, int most) { return (uint32_t)((UINT64_C(1) << at_most(columns, most)) - 1); }
-
-HALVED_PART __m512 floats_of(__m256i halves) {
-    return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(halves), 16));
-}
-
 /* What comes after the sums of sixteen columns. */
 HALVED_PART __m512 finished(const Result *r, __m512 sums, __m256i added) {
     if (r->added != NULL) sums = _mm512_add_ps(sums, floats_of(added));

@@ -1,7 +1,9 @@
 /* What lies beside the convolutions of the small pair of networks (lfcore.compact; lfcore.compact_parts has the same by torch).
  *
  * "Pixels" here are those of half the resolution, each with four phases: of pixel (y, x), phase 2 dy + dx lies at (2 y + dy,
- * 2 x + dx) of the whole picture. Values of the networks, "halved", are bfloat16, else float32.
+ * 2 x + dx) of the whole picture. Values of the networks, "halved", are bfloat16, else float32. Pictures that only compact_warp.c and
+ * compact_blend.c read and write, "shortened", are half-precision floats, half the memory, where they are for AVX-512
+ * (compact_*_halved.c), else float32.
  */
 #ifndef LFCORE_KERNELS_COMPACT_H
 #define LFCORE_KERNELS_COMPACT_H
@@ -13,38 +15,6 @@ typedef uint16_t EightHalves __attribute__((vector_size(16)));
 
 #define INPUTS 4
 #define PHASES 4
-#define GATHERED 64 /* channels that the colour network takes */
-#define LOGITS (INPUTS * PHASES)
-#define OUTPUTS (LOGITS + 3 * PHASES) /* that it puts out */
-
-/* Pictures that only the passes below read and write, "shortened": half-precision floats, half the memory, where they are for
- * AVX-512 (compact_*_halved.c), else float32. */
-typedef struct {
-    const void *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
-    Py_ssize_t source_height, source_width;
-    const float *disparity; /* (PHASES, height, width), px */
-    const float *offsets; /* (2, INPUTS): what a pixel of disparity moves the place of sampling by, along x, then y */
-    Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
-    float a; /* of the cubic kernel */
-    float u, v; /* as the colour network takes them */
-    void *gathered; /* (height, width, GATHERED) */
-    int halved;
-    void *warped; /* (height, width, PHASES, INPUTS, 4) */
-    int shortened; /* whether corners and warped are */
-} Warp;
-
-typedef struct {
-    const void *outputs; /* (height, width, OUTPUTS): logits by input and phase, then the residual by phase and channel */
-    const void *straight; /* (height, width, 3 * PHASES): more of the residual */
-    int halved;
-    const void *warped; /* (height, width, PHASES, INPUTS, 4) */
-    int shortened; /* whether warped is; the rest is halved then */
-    const float *nearness; /* (INPUTS): added to the logits */
-    Py_ssize_t height, width;
-    float middle, weight, toe; /* what was taken off the warped inputs, what the residual counts, of the root tone */
-    float *picture; /* (picture_height, picture_width, 3), stored values */
-    Py_ssize_t picture_height, picture_width; /* at most twice the pixels */
-} Blend;
 
 PART void as_floats(const void *source, Py_ssize_t first, Py_ssize_t count, int halved, float *restrict out) {
     if (halved) {
@@ -98,8 +68,7 @@ HALVED_PART __m512 exponential_of_sixteen(__m512 x) {
 }
 
 HALVED_PART __m512 floats_at(const uint16_t *halves, __mmask16 counting) {
-    const __m512i wide = _mm512_cvtepu16_epi32(_mm256_maskz_loadu_epi16(counting, halves));
-    return _mm512_castsi512_ps(_mm512_slli_epi32(wide, 16));
+    return floats_of(_mm256_maskz_loadu_epi16(counting, halves));
 }
 
 /* The greatest of four parts of four, in each of them. */

@@ -1,8 +1,5 @@
 /* The last steps of the colour network of the small pair: weights of the inputs and a residual to the picture. */
-#include "compact.h"
-
-/* Rows `begin` to `end` where `warped` is shortened and `takes_halves` (compact_blend_halved.c). */
-void blend_rows_in_halves(const Blend *b, Py_ssize_t begin, Py_ssize_t end);
+#include "compact_blend.h"
 
 /* The inverse of the root tone, within 0 and 1; not a number becomes 0. */
 PART float stored(float toned, float toe) {

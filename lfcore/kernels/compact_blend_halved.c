@@ -1,7 +1,5 @@
 /* compact_blend.c for processors with AVX-512: the four phases of a pixel are the four parts of a register. */
-#include "compact.h"
-
-void blend_rows_in_halves(const Blend *b, Py_ssize_t begin, Py_ssize_t end); /* see compact_blend.c */
+#include "compact_blend.h"
 
 #ifdef HALVED_COMPILED
 
@@ -28,7 +26,8 @@ HALVED_PART void blend_pixel(const Blend *b, Py_ssize_t y, Py_ssize_t x, __m512 
         const __m256i inputs = _mm256_loadu_si256((const __m256i *)(warped + phase * INPUTS * 4));
         weighted[phase] = counts * _mm512_cvtph_ps(inputs);
     }
-    const __m512 residual = floats_at(outputs + LOGITS, 0x0FFF) + floats_at((const uint16_t *)b->straight + pixel * 3 * PHASES, 0x0FFF);
+    const uint16_t *straight = (const uint16_t *)b->straight + pixel * 3 * PHASES;
+    const __m512 residual = floats_at(outputs + LOGITS, 0x0FFF) + floats_at(straight, 0x0FFF);
     const __m512i with_fourth = _mm512_set_epi32(15, 11, 10, 9, 15, 8, 7, 6, 15, 5, 4, 3, 15, 2, 1, 0);
     const __m512 toned = sums_of_parts(weighted) + b->middle + b->weight * _mm512_permutexvar_ps(with_fourth, residual);
     /* What is not a number becomes 0: the greatest is the second operand then. */

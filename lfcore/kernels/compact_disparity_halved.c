@@ -5,8 +5,6 @@
 
 #define LANES 16
 
-PART __mmask16 first_lanes(Py_ssize_t count) { return (__mmask16)((1u << at_least(at_most(count, LANES), 0)) - 1); }
-
 /* The deviations of row y, summed over the rows around it, at columns from -BOX on: zero beyond the edges. */
 HALVED_PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict sums) {
     const Py_ssize_t w = d->width, outputs = d->outputs, row = 2 * w * d->levels;
@@ -16,7 +14,7 @@ HALVED_PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict sums
     for (Py_ssize_t x = 0; x < w; ++x) {
         const uint16_t *first = (const uint16_t *)d->features + begin * row + (2 * x + 1) * d->levels;
         for (Py_ssize_t level = 0; level < outputs; level += LANES) {
-            const __mmask16 counting = first_lanes(d->levels - level);
+            const __mmask16 counting = (__mmask16)lanes_within(d->levels - level, LANES);
             __m512 sum = floats_at(first + level, counting);
             for (Py_ssize_t near = 1; near < end - begin; ++near) sum += floats_at(first + level + near * row, counting);
             _mm512_storeu_ps(sums + (x + BOX) * outputs + level, sum);
@@ -84,10 +82,10 @@ __attribute__((HALVED)) void phases_of_sixteens(const Disparity *d, Py_ssize_t y
         __m512 neighbours[3], own[3], whole = _mm512_setzero_ps(), sum = _mm512_setzero_ps();
         nine_neighbours(coarse + x, w + 2, neighbours);
         for (int k = 0; k < 3; ++k) own[k] = _mm512_loadu_ps(scores + x * SPREAD + k * LANES);
-        own[2] = _mm512_mask_blend_ps(first_lanes(PHASES), own[0], own[2]); /* beyond the ninth, no greater than the greatest */
+        own[2] = _mm512_mask_blend_ps((__mmask16)lanes_within(PHASES, LANES), own[0], own[2]); /* beyond the ninth, no greater than the greatest */
         const __m512 best = greatest_of_parts(_mm512_max_ps(_mm512_max_ps(own[0], own[1]), own[2]));
         for (int k = 0; k < 3; ++k) {
-            const __mmask16 counting = first_lanes((NEIGHBOURS - k * PHASES) * PHASES);
+            const __mmask16 counting = (__mmask16)lanes_within((NEIGHBOURS - k * PHASES) * PHASES, LANES);
             const __m512 shares = _mm512_maskz_mov_ps(counting, exponential_of_sixteen(own[k] - best));
             whole += shares;
             sum += shares * neighbours[k];

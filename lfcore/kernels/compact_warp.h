@@ -3,6 +3,22 @@
 
 #include "compact.h"
 
+#define GATHERED 64 /* channels that the colour network takes */
+
+typedef struct {
+    const void *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
+    Py_ssize_t source_height, source_width;
+    const float *disparity; /* (PHASES, height, width), px */
+    const float *offsets; /* (2, INPUTS): what a pixel of disparity moves the place of sampling by, along x, then y */
+    Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
+    float a; /* of the cubic kernel */
+    float u, v; /* as the colour network takes them */
+    void *gathered; /* (height, width, GATHERED) */
+    int halved;
+    void *warped; /* (height, width, PHASES, INPUTS, 4) */
+    int shortened; /* whether corners and warped are */
+} Warp;
+
 /* Rows `begin` to `end` of a warp that is shortened and halved, where `takes_halves` (compact_warp_halved.c). Not 0 where there is
  * no memory. */
 int warp_rows_in_halves(const Warp *warp, Py_ssize_t begin, Py_ssize_t end);

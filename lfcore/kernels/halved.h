@@ -23,6 +23,17 @@ void halved_products(const uint16_t *rows, Py_ssize_t count, Py_ssize_t pairs, c
 #define HALVED_TARGET "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,bmi,bmi2"
 #define HALVED target(HALVED_TARGET)
 #define HALVED_PART static inline __attribute__((always_inline, HALVED))
+
+/* Sixteen of bfloat16. */
+HALVED_PART __m512 floats_of(__m256i halves) {
+    return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(halves), 16));
+}
+
+/* The lanes that count where so many values are left. */
+PART uint32_t lanes_within(Py_ssize_t values, int most) {
+    return (uint32_t)((UINT64_C(1) << at_least(at_most(values, most), 0)) - 1);
+}
+
 #define SUMS 24 /* registers of them, which leaves as many as a product needs of 32 */
 
 /* Numbers of rows and of groups that are constants. bias: NULL for none. to_next: floats from one row of `out` to the next. */

@@ -21,14 +21,12 @@ PART Py_ssize_t pairs(const Winograd *w) { return (w->channels + 1) / 2; }
 PART Py_ssize_t inputs_of_a_place(const Winograd *w) { return spaced(TILES * pairs(w) * 4) / 2; }
 PART Py_ssize_t products_of_a_tile(const Winograd *w) { return spaced(PLACES * w->groups * COLUMNS * 4) / 4; }
 
-PART uint16_t first_lanes(Py_ssize_t count) { return (uint16_t)((1u << count) - 1); }
-
 HALVED_PART Sixteen not_negative(Sixteen values) { return (Sixteen)_mm512_max_ps((__m512)values, _mm512_setzero_ps()); }
 
 HALVED_PART Sixteen floats_at(const uint16_t *values, uint16_t counting) {
     const __m256i narrow =
         counting == ALL ? _mm256_loadu_si256((const __m256i *)values) : _mm256_maskz_loadu_epi16(counting, values);
-    return (Sixteen)_mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(narrow), 16));
+    return (Sixteen)floats_of(narrow);
 }
 
 HALVED_PART void put(uint16_t *out, uint16_t counting, Sixteen values) {
@@ -120,7 +118,7 @@ HALVED_PART void transform(const Winograd *w, Place at, const uint16_t *zeros, u
     Py_ssize_t channel = 0;
     for (; channel + 2 * LANES <= w->channels; channel += 2 * LANES) transform_many(w, &tile, channel, inputs);
     for (; channel + LANES <= w->channels; channel += LANES) transform_sixteen(w, &tile, channel, ALL, inputs);
-    if (channel < w->channels) transform_sixteen(w, &tile, channel, first_lanes(w->channels - channel), inputs);
+    if (channel < w->channels) transform_sixteen(w, &tile, channel, (uint16_t)lanes_within(w->channels - channel, LANES), inputs);
 }
 
 HALVED_PART void transform_back(
@@ -165,7 +163,7 @@ __attribute__((HALVED)) static void convolve_block(
         const float *own = products + tile * products_of_a_tile(w);
         Py_ssize_t channel = 0;
         for (; channel + LANES <= w->outputs; channel += LANES) transform_back(w, places[tile], channel, ALL, own);
-        if (channel < w->outputs) transform_back(w, places[tile], channel, first_lanes(w->outputs - channel), own);
+        if (channel < w->outputs) transform_back(w, places[tile], channel, (uint16_t)lanes_within(w->outputs - channel, LANES), own);
     }
 }
 
