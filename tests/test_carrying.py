@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,17 @@ from lfcore.lightfield import FloatArray
 
 SIZE = 40, 50
 MADE_AT = 0.5, 0.5
+
+
+@pytest.fixture
+def textures(gl: Any) -> Iterator[Textures]:
+    resting_place = gl.framebuffer([gl.texture((1, 1), 4)])
+    made = Textures(gl, np.zeros((4, *SIZE, 3), np.uint8), "f4")
+    made.made_at = MADE_AT
+    yield made
+    resting_place.use()  # what is drawn into is not to be released
+    made.release()
+    assert gl.error == "GL_NO_ERROR"
 
 
 def square(near: float, far: float) -> FloatArray:
@@ -40,11 +52,12 @@ def searched(disparity: FloatArray, shift: tuple[float, float], values: tuple[fl
 
 @pytest.mark.parametrize(("near", "far"), [(-6.0, 4.0), (10.0, 11.0), (-11.0, -10.0)])  # the last two nearly move as a whole
 @pytest.mark.parametrize(("pixels", "steps"), [(0.45, 0), (0.95, 1), (3.3, 3)])
-def test_it_is_found_by_as_few_steps_as_things_move_far(gl: Any, near: float, far: float, pixels: float, steps: int) -> None:
-    textures = Textures(gl, np.zeros((4, *SIZE, 3), np.uint8), "f4")
+def test_it_is_found_by_as_few_steps_as_things_move_far(
+    gl: Any, textures: Textures, near: float, far: float, pixels: float, steps: int
+) -> None:
     disparity = square(near, far)
     textures.disparity_map.write(disparity)
-    textures.disparity_range, textures.made_at = (near, far), MADE_AT
+    textures.disparity_range = near, far
     distance = pixels / max(abs(near), abs(far))
     for direction in (0.3, 2.0, 4.1):
         viewpoint = MADE_AT[0] + distance * math.cos(direction), MADE_AT[1] + distance * math.sin(direction)
@@ -55,12 +68,9 @@ def test_it_is_found_by_as_few_steps_as_things_move_far(gl: Any, near: float, fa
         known = ~np.isnan(expected)
         assert known.mean() > 0.9 and {near, far} == set(expected[known])
         np.testing.assert_array_equal(found[known], expected[known])
-    textures.release()
 
 
-def test_along_lines_of_viewpoints_as_many_steps_as_there_are(gl: Any) -> None:
-    textures = Textures(gl, np.zeros((4, *SIZE, 3), np.uint8), "f4")
-    textures.disparity_range, textures.made_at = (-1.0, 1.0), MADE_AT
+def test_along_lines_of_viewpoints_as_many_steps_as_there_are(textures: Textures) -> None:
+    textures.disparity_range = -1.0, 1.0
     assert carrying(textures, MADE_AT)["steps"] == 0
     assert carrying(textures, MADE_AT, farthest=math.inf)["steps"] == 3
-    textures.release()
