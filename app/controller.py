@@ -491,8 +491,9 @@ class Controller:
         unweighed = picture is not None and picture.synthesis.weights is None and weighed
         if picture is None or not picture.final or unscored or unweighed:
             moving = not self._resting or (self.newest is None and not self._faulted)
-            if self._engine.quick and moving and (picture is None or not picture.final):
-                return Wish(Task.QUICK, here) if picture is None else None
+            if self._engine.quick and moving and picture is None:
+                return Wish(Task.QUICK, here)
+            # Also while the hand may be about to move on: if it does, this is broken off at once.
             return Wish(Task.FINAL, here, weighed=weighed)
         return self._wanted_later(light_field) if self._resting else None
 

@@ -327,26 +327,42 @@ def pair() -> Iterator[tuple[Program, TruthSynthesizer]]:
     made.controller.stop()
 
 
-def test_the_quick_model_serves_the_moving_hand_and_the_other_the_resting_one(
+def test_the_quick_model_serves_the_moving_hand_and_the_other_the_one_that_waits(
     pair: tuple[Program, TruthSynthesizer],
 ) -> None:
-    program, _ = pair
+    program, quick = pair
     controller = program.controller
     program.open("3x3")
     program.until(lambda: controller.step is Step.REALTIME)  # the first picture, too, is the quick one's
-    assert program.synthesizer.asked == []
     program.until_full()
+    assert quick.asked == program.synthesizer.asked == [(0.5, 0.5)]
     program.tick(2 * FADE_SECONDS)
-    for part in range(1, 6):
-        controller.state.move_to(0.5 + 0.01 * part, 0.5)
-        program.until(lambda: controller.picture is not None, 0.0)
-        assert controller.step is Step.REALTIME
-        program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))  # faded in, and not yet at rest
-    assert program.synthesizer.asked == [(0.5, 0.5)]
+    for part in range(1, 101):  # the hand is always ahead of it
+        controller.state.move_to(0.5 + 0.001 * part, 0.5)
+        program.tick(0.002)
+        time.sleep(0.002)
+    assert len(quick.asked) > 5 and program.synthesizer.asked == [(0.5, 0.5)]
     program.until_full()
-    assert program.synthesizer.asked == [(0.5, 0.5), (0.55, 0.5)]
+    assert quick.asked[-1] == program.synthesizer.asked[-1] == controller.viewpoint
+    assert len(program.synthesizer.asked) == 2
     assert controller.picture is not None
     assert controller.picture.final
+
+
+def test_the_picture_is_refined_as_soon_as_the_quick_one_is_there_though_the_hand_may_move_on(
+    pair: tuple[Program, TruthSynthesizer],
+) -> None:
+    program, quick = pair
+    controller = program.controller
+    program.open("3x3")
+    program.until_full()
+    program.tick(2 * FADE_SECONDS)
+    controller.state.move_to(0.51, 0.5)
+    program.until(lambda: len(program.synthesizer.asked) > 1, 0.0)  # no time passes: the hand does not count as resting
+    assert quick.asked[-1] == program.synthesizer.asked[-1] == (0.51, 0.5)
+    program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))  # the quick one has been faded in
+    program.until(lambda: controller.step is Step.FULL, 0.0)
+    assert len(program.synthesizer.asked) == 2  # and nothing is computed ahead yet
 
 
 def test_a_synthesis_for_the_resting_hand_is_broken_off_as_soon_as_the_hand_moves(
@@ -370,6 +386,7 @@ def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Progr
     program.open("3x3")
     program.until_full()
     program.tick(2 * FADE_SECONDS)
+    program.synthesizer.seconds = 60.0
     controller.state.move_to(0.52, 0.5)
     program.tick(0.0)
     assert controller.step is Step.INSTANT  # carried, but not made by the quick model
