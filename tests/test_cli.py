@@ -314,7 +314,22 @@ def test_train_hands_its_options_to_the_loop(
 
     monkeypatch.setattr(loop, "train", train)
     out = tmp_path / "w.safetensors"
-    options = ["--steps", "5", "--patch", "40", "--batch", "8", "--lr", "0.002", "--seed", "3", "--minutes", "1.5"]
+    options = [
+        "--steps",
+        "5",
+        "--patch",
+        "40",
+        "--batch",
+        "6",
+        "--group",
+        "3",
+        "--lr",
+        "0.002",
+        "--seed",
+        "3",
+        "--minutes",
+        "1.5",
+    ]
     options += ["--generated", "1"]
     before = signal.getsignal(signal.SIGINT)
     assert main(["train", "--data", str(scene), "--out", str(out), "--device", "cpu", *options]) == 130
@@ -322,7 +337,7 @@ def test_train_hands_its_options_to_the_loop(
     config, runtime = seen["config"], seen["runtime"]
     assert isinstance(config, loop.TrainConfig)
     assert (config.steps, config.learning_rate, config.seed) == (5, 0.002, 3)
-    assert (config.patches.size, config.patches.batch) == (40, 8)
+    assert (config.patches.size, config.patches.batch, config.patches.group) == (40, 6, 3)
     assert isinstance(runtime, loop.Runtime)
     assert (runtime.device, runtime.stop_after_minutes) == ("cpu", 1.5)
     assert (seen["out"], seen["run_dir"]) == (out, tmp_path / "w")

@@ -63,7 +63,10 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--minutes", type=positive, metavar="M", default=math.inf, help="stop after so long (default: never)")
     parser.add_argument("--steps", type=count, metavar="N", default=20000, help="steps of the whole schedule (default: 20000)")
     parser.add_argument("--patch", type=count, metavar="PX", default=60, help="side of a training patch (default: 60)")
-    parser.add_argument("--batch", type=count, metavar="N", default=20, help="patches a step, a multiple of 4 (default: 20)")
+    parser.add_argument("--batch", type=count, metavar="N", default=20, help="patches a step (default: 20)")
+    parser.add_argument(
+        "--group", type=count, metavar="N", default=4, help="patches that share a viewpoint and its sweep; divides --batch (4)"
+    )
     parser.add_argument("--lr", type=positive, metavar="R", default=1e-4, help="learning rate (default: 1e-4)")
     parser.add_argument("--decay", type=share, metavar="F", default=0.3, help="last share of the steps, of a falling rate")
     parser.add_argument(
@@ -164,9 +167,10 @@ def _config(options: argparse.Namespace) -> TrainConfig:
     from lfcore.training.patches import PatchConfig
 
     try:
-        patches = PatchConfig(size=options.patch, batch=options.batch, tone_share=options.tones)
+        patches = PatchConfig(size=options.patch, batch=options.batch, group=options.group, tone_share=options.tones)
     except ValueError as error:
-        raise InputError(f"--patch {options.patch} --batch {options.batch} will not do: {error}.") from error
+        asked = f"--patch {options.patch} --batch {options.batch} --group {options.group}"
+        raise InputError(f"{asked} will not do: {error}.") from error
     return TrainConfig(
         steps=options.steps,
         learning_rate=options.lr,
