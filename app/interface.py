@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -69,6 +70,7 @@ class Interface:
         self._exhibit: Exhibit | None = None  # likewise
         self._timer = self._canvas.timer()
         self._timed = False  # a picture was made in the last frame
+        self._prepared: Frame | None = None  # what has been made in this one
         self._saving = False  # the picture of this frame is to be saved
         self._picture_ms: float | None = None
         self._faults = 0  # frames in a row that have failed
@@ -118,6 +120,7 @@ class Interface:
     def _draw(self, target: Target, now: float) -> None:
         self.controller.tick(now)
         self.surroundings.arrive()
+        self._synchronise()
         self._change_theme()
         self._atlas.begin()
         imgui.backends.opengl3_new_frame()
@@ -126,7 +129,9 @@ class Interface:
         state = self.controller.state
         readout = replace(self.controller.readout(self._picture_ms), shelf=self.surroundings.shelf())
         readout = replace(readout, focus=replace(readout.focus, summed=self._canvas.summed))
-        layout, requests = panels.draw(state, readout, (display.x, display.y), self._scale, self._fonts)
+        pixels = target.size[0] / max(display.x, 1.0)
+        begin = partial(self._begin, target, pixels)
+        layout, requests = panels.draw(state, readout, (display.x, display.y), self._scale, self._fonts, begin)
         imgui.render()
         # What the panels changed is drawn in this very frame.
         for request in requests:
@@ -135,9 +140,6 @@ class Interface:
         self.surroundings.tick(now, imgui.is_any_mouse_down() or state.swaying)
         self._synchronise()
         self._synchronise_exhibit()
-        pixels = target.size[0] / max(display.x, 1.0)
-        grounds = [area for area in (layout.panel, layout.status) if area is not None]
-        self._canvas.begin(target, [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in grounds], _rgb(theme.BACKGROUND))
         if self._light_field is not None:
             self._draw_picture(target, layout, pixels)
         elif self._exhibit is not None:
@@ -146,6 +148,26 @@ class Interface:
             self._save_picture(target, layout, pixels)
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+
+    def _begin(self, target: Target, pixels: float, layout: Layout) -> None:
+        """Have the picture made for what the hand has just done, and the window cleared.
+
+        Software rasterisers make the picture in threads of their own, which begin when another target is drawn into: while the
+        panels are laid out, and not after that.
+        """
+        self._prepared = None
+        if self._light_field is not None:
+            self._prepare()
+        grounds = [area for area in (layout.panel, layout.status) if area is not None]
+        self._canvas.begin(target, [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in grounds], _rgb(theme.BACKGROUND))
+
+    def _prepare(self) -> None:
+        """Make the picture at the light field's own size, and time it."""
+        if self._timed:  # asked one frame later, when the graphics have done it, so that nothing waits
+            self._picture_ms = 1e-6 * self._timer.elapsed
+        self._prepared = self._frame()
+        with self._timer:
+            self._timed = self._canvas.prepare(self._prepared)
 
     @property
     def next_frame_in(self) -> float | None:
@@ -304,11 +326,9 @@ class Interface:
 
     def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
         """`pixels`: framebuffer pixels per window unit."""
-        if self._timed:  # asked one frame later, when the graphics have done it, so that nothing waits
-            self._picture_ms = 1e-6 * self._timer.elapsed
         frame = self._frame()
-        with self._timer:
-            self._timed = self._canvas.prepare(frame)
+        if frame != self._prepared:  # the panels have changed it
+            self._canvas.prepare(frame)
         state = self.controller.state
         for pane in arrange(state, layout.picture):
             shown = self._partner_frame() if pane.partner else frame

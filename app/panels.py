@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from imgui_bundle import imgui
 
 from app import keyboard, overlays, picture, sidebar, statusbar, strips, theme
@@ -19,13 +21,23 @@ from app.state import ViewState
 _NO_PICTURE: Size = (1, 1)
 
 
+def _nothing(layout: Layout) -> None:
+    """For a caller without a picture."""
+
+
 def draw(
-    state: ViewState, readout: Readout, window: tuple[float, float], scale: float, fonts: theme.Fonts
+    state: ViewState,
+    readout: Readout,
+    window: tuple[float, float],
+    scale: float,
+    fonts: theme.Fonts,
+    begin: Callable[[Layout], None] = _nothing,
 ) -> tuple[Layout, list[Request]]:
     """Draw everything but the picture itself, between imgui's new_frame and render.
 
-    window: (width, height) in imgui's units. scale: content scale of text. Returns the layout, in which the caller draws
-    the picture, and the requests.
+    window: (width, height) in imgui's units. scale: content scale of text. begin: called with the layout as soon as the state
+    knows what keys and the mouse on the picture have done in this frame, long before the panels are drawn; they may still
+    change it. Returns the layout, in which the caller draws the picture, and the requests.
     """
     layout = lay_out(*window, scale, state.panel and (readout.grid is not None or bool(readout.captions)))
     if state.focusing.slices and readout.grid is not None and state.look.tiles == (1, 1):
@@ -45,6 +57,10 @@ def draw(
     if readout.grid is not None:
         panes = arrange(state, area)
         picture.draw(area, panes, state, size, scale)
+    elif readout.captions:
+        picture.draw_still(area, state, size)
+    begin(layout)
+    if readout.grid is not None:
         overlays.pixels(panes, state, readout, size, scale)
         overlays.names(panes, state, readout)
         overlays.cross_hairs(panes, state, size)
@@ -58,7 +74,6 @@ def draw(
         if not covered:
             overlays.missing(area, context, readout)
     elif readout.captions:
-        picture.draw_still(area, state, size)
         overlays.legend(area, state, readout)
     elif readout.loading is None and not covered:
         overlays.start(area, context, readout.shelf, fonts)

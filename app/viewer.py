@@ -195,12 +195,16 @@ class _Window:
         glfw.set_mouse_button_callback(self._window, self._pressed)
         glfw.set_scroll_callback(self._window, self._pressed)
         glfw.set_key_callback(self._window, self._pressed)
+        for follow_size in (glfw.set_framebuffer_size_callback, glfw.set_window_size_callback):
+            follow_size(self._window, self._resized)
+        glfw.set_window_content_scale_callback(self._window, self._resized)
+        self._resized()
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
 
     def attach(self, controller: Controller, surroundings: Surroundings) -> None:
         """Show this controller's light field from now on."""
-        self._interface = Interface(controller, self._context, self._scale(), surroundings)
+        self._interface = Interface(controller, self._context, self._scale, surroundings)
 
     def place(self) -> WindowPlace:
         """Where the window is; of a maximised one where it would go back to."""
@@ -225,7 +229,7 @@ class _Window:
 
     def warm_up(self) -> None:
         """See Interface.warm_up."""
-        self._at_hand.warm_up(Target(self._target, glfw.get_framebuffer_size(self._window)))
+        self._at_hand.warm_up(Target(self._target, self._size))
 
     def run(self) -> None:
         """Draw frames as they are needed until the window is closed."""
@@ -261,11 +265,11 @@ class _Window:
             self._draw()
 
     def _draw(self) -> None:
-        size = glfw.get_framebuffer_size(self._window)
+        size = self._size
         if min(size) == 0:
             return  # minimised
         interface = self._at_hand
-        interface.set_scale(self._scale())
+        interface.set_scale(self._scale)
         imgui.backends.glfw_new_frame()
         interface.draw(Target(self._target, size), time.monotonic())
         glfw.swap_buffers(self._window)
@@ -310,11 +314,13 @@ class _Window:
             waits.append(_CARET_INTERVAL)
         return min(waits)
 
-    def _scale(self) -> float:
-        """Content scale in imgui's units, which on some systems are scaled already."""
+    def _resized(self, *_: object) -> None:
+        """Take note of size and scale, for which an X server is asked each time: a frame would wait for its answers."""
+        self._size = glfw.get_framebuffer_size(self._window)
+        # Content scale in imgui's units, which on some systems are scaled already.
         content = max(glfw.get_window_content_scale(self._window))
         width = max(glfw.get_window_size(self._window)[0], 1)
-        return content * width / max(glfw.get_framebuffer_size(self._window)[0], 1) or 1.0
+        self._scale = content * width / max(self._size[0], 1) or 1.0
 
     def _name_window(self, controller: Controller) -> None:
         title = f"{controller.name} \N{EN DASH} {TITLE}" if controller.name else TITLE

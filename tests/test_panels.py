@@ -30,6 +30,9 @@ class Screen:
         self.state = ViewState()
         self.readout = OPEN
         self.requests: list[Request] = []
+        self.begun: list[
+            tuple[Layout, float, float]
+        ] = []  # in each frame: the layout and the viewpoint when the picture may begin
         self.size = SIZE
         self.scale = scale
         self.fonts = theme.apply(scale)
@@ -44,11 +47,14 @@ class Screen:
         for _ in range(count):
             self.io.display_size = self.imgui.ImVec2(*self.size)
             self.imgui.new_frame()
-            self.layout, requests = panels.draw(self.state, self.readout, self.size, self.scale, self.fonts)
+            self.layout, requests = panels.draw(self.state, self.readout, self.size, self.scale, self.fonts, self._begin)
             self.imgui.render()
             for texture in self.imgui.get_draw_data().textures:
                 texture.set_status(self.imgui.ImTextureStatus.ok)
             self.requests += requests
+
+    def _begin(self, layout: Layout) -> None:
+        self.begun.append((layout, self.state.u, self.state.v))
 
     def press(self, name: str) -> None:
         """Press and release a key, or a chord, by the name on its cap."""
@@ -165,6 +171,28 @@ def test_dragging_the_picture_turns_the_scene_by_hand(screen: Screen) -> None:
     assert screen.state.u == pytest.approx(0.5 - 90 / DRAG_SPAN)
     assert screen.state.v == pytest.approx(0.5 + 36 / DRAG_SPAN)
     assert not screen.state.dragging
+
+
+def test_the_picture_may_begin_once_keys_and_the_mouse_have_moved_the_viewpoint(screen: Screen) -> None:
+    screen.move(400, 300)
+    screen.io.add_mouse_button_event(0, True)
+    screen.frame()
+    before = len(screen.begun)
+    for x in (410, 425):
+        u = screen.state.u
+        screen.move(x, 300)
+        assert screen.begun[-1] == (screen.layout, screen.state.u, screen.state.v)
+        assert screen.state.u < u
+    screen.io.add_mouse_button_event(0, False)
+    screen.frame(2)
+    u = screen.state.u
+    screen.io.add_key_event(screen.imgui.Key.right_arrow, True)
+    screen.frame()
+    assert screen.begun[-1] == (screen.layout, screen.state.u, screen.state.v)
+    assert screen.state.u > u
+    assert len(screen.begun) == before + 5  # once a frame
+    screen.io.add_key_event(screen.imgui.Key.right_arrow, False)
+    screen.frame(2)
 
 
 def test_drag_length_follows_the_content_scale(imgui_context: Any) -> None:

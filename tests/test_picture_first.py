@@ -1,0 +1,70 @@
+"""The picture is begun before the panels are drawn, and is made anew where they change what it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from moving_scene import TruthSynthesizer, light_field
+
+from app.canvas import Canvas, Frame
+from app.controller import Controller
+from app.engine import Engine
+from app.geometry import Point
+from app.offscreen import Offscreen
+from app.sidebar import viewpoint_pad
+from app.state import ViewState
+
+FIRST, MOVED = (0.5, 0.5), (0.3, 0.4)
+
+
+@pytest.fixture
+def viewer(gl: Any) -> Iterator[Offscreen]:
+    controller = Controller(Engine(lambda: TruthSynthesizer(), 2**24), lambda *_: light_field(2, 2), lambda: None, "truth")
+    made = Offscreen(controller, gl, (800, 600), 1.0)
+    controller.show_light_field(light_field(2, 2))
+    made.settled()
+    yield made
+    made.close()
+    controller.stop()
+    assert gl.error == "GL_NO_ERROR"
+
+
+class Recorder:
+    """In which order pictures were made, panels drawn and pictures shown, and for which viewpoint."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, moved: Point | None) -> None:
+        self.order: list[tuple[str, Point]] = []
+        prepare, draw, pad = Canvas.prepare, Canvas.draw, viewpoint_pad.draw
+
+        def recorded_prepare(canvas: Canvas, frame: Frame) -> bool:
+            self.order.append(("made", frame.viewpoint))
+            return prepare(canvas, frame)
+
+        def recorded_draw(canvas: Canvas, frame: Frame, *where: Any) -> None:
+            self.order.append(("shown", frame.viewpoint))
+            draw(canvas, frame, *where)
+
+        def moving_pad(state: ViewState, *others: Any) -> Any:
+            self.order.append(("panels", (state.u, state.v)))
+            result = pad(state, *others)
+            if moved is not None:
+                state.move_to(*moved)
+            return result
+
+        monkeypatch.setattr(Canvas, "prepare", recorded_prepare)
+        monkeypatch.setattr(Canvas, "draw", recorded_draw)
+        monkeypatch.setattr(viewpoint_pad, "draw", moving_pad)
+
+
+def test_the_picture_is_made_once_and_before_the_panels(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(monkeypatch, None)
+    viewer.draw()
+    assert recorder.order == [("made", FIRST), ("panels", FIRST), ("shown", FIRST)]
+
+
+def test_what_the_panels_change_is_shown_in_the_same_frame(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(monkeypatch, MOVED)
+    viewer.draw()
+    assert recorder.order == [("made", FIRST), ("panels", FIRST), ("made", MOVED), ("shown", MOVED)]
