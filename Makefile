@@ -24,7 +24,7 @@ F01 = $(WEIGHTS)/f01/IMG_1.lfp $(WEIGHTS)/f01/IMG_2.lfp
 ILLUM = $(foreach name,IMG_0288 bikes_4 bikes_11,$(DATA)/train/$(name))
 LARGE = $(foreach name,hci_antinous hci_bicycle hci_pens,$(DATA)/train/$(name))
 ALL = $(DATA)/train $(ILLUM) $(ILLUM) $(LARGE) $(LARGE) $(F01) $(F01)
-# In the last part of the training half of what is drawn comes from the former, a seventh from the F01.
+# In the second part of the training half of what is drawn comes from the three of the Illum, a seventh from the F01.
 CAPTURES = $(DATA)/train $(foreach n,1 2 3 4 5 6 7 8,$(ILLUM)) $(LARGE) $(foreach n,1 2 3 4,$(F01)) $(DATA)/train/Bikes $(DATA)/train/Bikes
 TRAIN = $(PYTHON) -m app train --val $(DATA)/val --generated 300 --textures $(TEXTURES) --balance 0.75
 FIRST = $(WEIGHTS)/first
@@ -46,7 +46,7 @@ test: $(VENV)/ready-for-tests window-packages test-packages
 	$(VENV)/bin/mypy
 	$(PYTHON) -m pytest
 
-# The small pair first, since it teaches the paper's pair: about 3, 4 and 1 hours on two cores. Each goes on where it was stopped.
+# The small pair first, since it teaches the paper's pair: about 3, 3 and 1 hours on two cores. Each goes on where it was stopped.
 weights: $(VENV)/ready $(WEIGHTS)/f01/ready
 	mkdir -p $(FIRST)
 	$(TRAIN) --data $(ALL) --generated-share 0.4 --model realtime --out $(FIRST)/realtime.safetensors --patch 128 --batch 8 --lr 1e-3 --steps 30000 --decay 0.75 --average 0.998 --matching 200 --tones 0.6

@@ -70,7 +70,7 @@ class Interface:
         self._exhibit: Exhibit | None = None  # likewise
         self._timer = self._canvas.timer()
         self._timed = False  # a picture was made in the last frame
-        self._prepared: Frame | None = None  # what has been made in this one
+        self._prepared: Frame | None = None  # what has been made in this one of what the canvas has taken
         self._saving = False  # the picture of this frame is to be saved
         self._picture_ms: float | None = None
         self._faults = 0  # frames in a row that have failed
@@ -269,6 +269,7 @@ class Interface:
                     controller.say(_sentence(error))
                     return
             self._light_field = light_field
+            self._prepared = None
         if light_field is None:
             return
         answer = controller.newest
@@ -277,6 +278,7 @@ class Interface:
             at = synthesis.u, synthesis.v
             canvas.set_synthesis(synthesis.image, answer.pixels, synthesis.disparity, at, synthesis.weights)
             self._answer = answer
+            self._prepared = None
             if answer.final and synthesis.model != self._model:
                 self._model = synthesis.model
                 canvas.redraw_between()
@@ -327,7 +329,7 @@ class Interface:
     def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
         """`pixels`: framebuffer pixels per window unit."""
         frame = self._frame()
-        if frame != self._prepared:  # the panels have changed it
+        if frame != self._prepared:  # the panels have changed it, or the canvas has taken more since
             self._canvas.prepare(frame)
         state = self.controller.state
         for pane in arrange(state, layout.picture):

@@ -21,17 +21,13 @@ from app.state import ViewState
 _NO_PICTURE: Size = (1, 1)
 
 
-def _nothing(layout: Layout) -> None:
-    """For a caller without a picture."""
-
-
 def draw(
     state: ViewState,
     readout: Readout,
     window: tuple[float, float],
     scale: float,
     fonts: theme.Fonts,
-    begin: Callable[[Layout], None] = _nothing,
+    begin: Callable[[Layout], None],
 ) -> tuple[Layout, list[Request]]:
     """Draw everything but the picture itself, between imgui's new_frame and render.
 

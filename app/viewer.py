@@ -195,9 +195,12 @@ class _Window:
         glfw.set_mouse_button_callback(self._window, self._pressed)
         glfw.set_scroll_callback(self._window, self._pressed)
         glfw.set_key_callback(self._window, self._pressed)
-        for follow_size in (glfw.set_framebuffer_size_callback, glfw.set_window_size_callback):
-            follow_size(self._window, self._resized)
-        glfw.set_window_content_scale_callback(self._window, self._resized)
+        for follow in (
+            glfw.set_framebuffer_size_callback,
+            glfw.set_window_size_callback,
+            glfw.set_window_content_scale_callback,
+        ):
+            follow(self._window, self._resized)
         self._resized()
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)

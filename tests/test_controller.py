@@ -60,6 +60,12 @@ class Program:
         self.controller.open(Path(name))
         self.until(lambda: self.controller.readout(None).loading is None)
 
+    def open_and_fade_in(self, name: str) -> None:
+        """Open it and wait until its first finished picture is on screen, whole."""
+        self.open(name)
+        self.until_full()
+        self.tick(2 * FADE_SECONDS)
+
     def until_full(self) -> None:
         self.until(lambda: self.controller.step is Step.FULL)
 
@@ -106,9 +112,7 @@ def test_full_fades_in_when_new_and_is_there_at_once_from_the_cache(program: Pro
 
 
 def test_an_answer_for_a_viewpoint_that_was_left_is_not_shown_as_full(program: Program) -> None:
-    program.open("3x3")
-    program.until_full()
-    program.tick(2 * FADE_SECONDS)
+    program.open_and_fade_in("3x3")
     program.synthesizer.seconds = 0.2
     controller = program.controller
     controller.state.move_to(0.3, 0.3)
@@ -354,9 +358,7 @@ def test_the_picture_is_refined_as_soon_as_the_quick_one_is_there_though_the_han
 ) -> None:
     program, quick = pair
     controller = program.controller
-    program.open("3x3")
-    program.until_full()
-    program.tick(2 * FADE_SECONDS)
+    program.open_and_fade_in("3x3")
     controller.state.move_to(0.51, 0.5)
     program.until(lambda: len(program.synthesizer.asked) > 1, 0.0)  # no time passes: the hand does not count as resting
     assert quick.asked[-1] == program.synthesizer.asked[-1] == (0.51, 0.5)
@@ -370,9 +372,7 @@ def test_a_synthesis_for_the_resting_hand_is_broken_off_as_soon_as_the_hand_move
 ) -> None:
     program, quick = pair
     controller = program.controller
-    program.open("3x3")
-    program.until_full()
-    program.tick(2 * FADE_SECONDS)
+    program.open_and_fade_in("3x3")
     program.synthesizer.seconds = 60.0
     controller.state.move_to(0.3, 0.3)
     program.until(lambda: (0.3, 0.3) in program.synthesizer.asked)
@@ -383,9 +383,7 @@ def test_a_synthesis_for_the_resting_hand_is_broken_off_as_soon_as_the_hand_move
 def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Program, TruthSynthesizer]) -> None:
     program, quick = pair
     controller = program.controller
-    program.open("3x3")
-    program.until_full()
-    program.tick(2 * FADE_SECONDS)
+    program.open_and_fade_in("3x3")
     program.synthesizer.seconds = 60.0
     controller.state.move_to(0.52, 0.5)
     program.tick(0.0)
@@ -423,9 +421,7 @@ def moves_on(program: Program, steps: int) -> list[float]:
 
 
 def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(program: Program) -> None:
-    program.open("3x3")
-    program.until_full()
-    program.tick(2 * FADE_SECONDS)
+    program.open_and_fade_in("3x3")
     changed_at = moves_on(program, 60)
     assert len(changed_at) > 3
     assert min(later - earlier for earlier, later in pairwise(changed_at)) >= STREAM_FADE_SECONDS - 1e-6
@@ -434,9 +430,7 @@ def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(program: Program
 def test_quick_syntheses_follow_each_other_without_a_fade(pair: tuple[Program, TruthSynthesizer]) -> None:
     program, _ = pair
     controller = program.controller
-    program.open("3x3")
-    program.until_full()
-    program.tick(2 * FADE_SECONDS)
+    program.open_and_fade_in("3x3")
     controller.state.move_to(0.49, 0.5)
     program.until(lambda: controller.newest is not None and controller.newest.step is Step.REALTIME, 0.0)
     assert controller.share < 1  # from the one to the other model there is one

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import moderngl
 import pytest
-from moving_scene import TruthSynthesizer, light_field
+from moving_scene import light_field
 
 from app import panels
 from app.canvas import Canvas
-from app.controller import Controller
-from app.engine import Engine
 from app.interface import FAULTS_TO_CLOSE, FAULTS_TO_END
 from app.offscreen import Offscreen
 from app.sidebar import viewpoint_pad
-
-
-@pytest.fixture
-def viewer(gl: Any) -> Iterator[Offscreen]:
-    controller = Controller(Engine(lambda: TruthSynthesizer(), 2**24), lambda *_: light_field(2, 2), lambda: None, "truth")
-    made = Offscreen(controller, gl, (640, 480), 1.0)
-    controller.show_light_field(light_field(2, 2))
-    made.frame()
-    yield made
-    made.close()
-    controller.stop()
-    assert gl.error == "GL_NO_ERROR"
 
 
 def failing(original: Callable[..., Any], times: int, error: Exception) -> Callable[..., Any]:

@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from moving_scene import TruthSynthesizer, light_field
+from moving_scene import light_field
 
 from app.canvas import Canvas, Frame
-from app.controller import Controller
-from app.engine import Engine
 from app.geometry import Point
 from app.offscreen import Offscreen
 from app.sidebar import viewpoint_pad
 from app.state import ViewState
 
 FIRST, MOVED = (0.5, 0.5), (0.3, 0.4)
-
-
-@pytest.fixture
-def viewer(gl: Any) -> Iterator[Offscreen]:
-    controller = Controller(Engine(lambda: TruthSynthesizer(), 2**24), lambda *_: light_field(2, 2), lambda: None, "truth")
-    made = Offscreen(controller, gl, (800, 600), 1.0)
-    controller.show_light_field(light_field(2, 2))
-    made.settled()
-    yield made
-    made.close()
-    controller.stop()
-    assert gl.error == "GL_NO_ERROR"
 
 
 class Recorder:
@@ -62,6 +47,21 @@ def test_the_picture_is_made_once_and_before_the_panels(viewer: Offscreen, monke
     recorder = Recorder(monkeypatch, None)
     viewer.draw()
     assert recorder.order == [("made", FIRST), ("panels", FIRST), ("shown", FIRST)]
+
+
+def test_what_the_canvas_takes_after_the_beginning_is_shown_too(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(monkeypatch, None)
+    controller = viewer.interface.controller
+    other = light_field(3, 3)
+    pad = viewpoint_pad.draw
+
+    def opening_pad(*arguments: Any) -> None:
+        pad(*arguments)
+        controller.show_light_field(other)
+
+    monkeypatch.setattr(viewpoint_pad, "draw", opening_pad)
+    viewer.draw()
+    assert recorder.order == [("made", FIRST), ("panels", FIRST), ("made", FIRST), ("shown", FIRST)]
 
 
 def test_what_the_panels_change_is_shown_in_the_same_frame(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
