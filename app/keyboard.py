@@ -43,7 +43,7 @@ def run_pressed(context: commands.Context) -> None:
     typing = io.want_text_input or context.state.path_field or context.state.desk.card is not None
     typed = "" if typing else "".join(map(chr, io.input_queue_characters))
     if not typed and not any(imgui.is_key_down(key) or imgui.is_key_released(key) for key in _ALL):
-        return  # as in nearly all frames; to go through the commands takes a millisecond
+        return  # as in nearly all frames; to go through the commands takes four times as long
     held = _Held(_or_just_released(io.key_ctrl, _CTRL), _or_just_released(io.key_shift, _SHIFT))
     for name, command in commands.COMMANDS.items():
         keys = [key for key in command.keys if not (context.state.help and key in _SCROLLING)]

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from moving_scene import light_field
+from moving_scene import TruthSynthesizer, light_field
 
 from app.canvas import Canvas, Frame
 from app.geometry import Point
 from app.offscreen import Offscreen
 from app.sidebar import viewpoint_pad
 from app.state import ViewState
+from lfcore.errors import Cancelled
 
 FIRST, MOVED = (0.5, 0.5), (0.3, 0.4)
 
@@ -49,15 +50,22 @@ def test_the_picture_is_made_once_and_before_the_panels(viewer: Offscreen, monke
     assert recorder.order == [("made", FIRST), ("panels", FIRST), ("shown", FIRST)]
 
 
-def test_what_the_canvas_takes_after_the_beginning_is_shown_too(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
-    recorder = Recorder(monkeypatch, None)
+def test_a_light_field_that_comes_during_the_frame_is_made_ready_too(
+    viewer: Offscreen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object) -> None:
+        raise Cancelled
+
+    monkeypatch.setattr(TruthSynthesizer, "synthesize", never)
     controller = viewer.interface.controller
-    other = light_field(3, 3)
+    controller.show_light_field(light_field(3, 3))
+    viewer.draw()  # without a synthesis nothing tells the frames of two light fields apart
+    recorder = Recorder(monkeypatch, None)
     pad = viewpoint_pad.draw
 
     def opening_pad(*arguments: Any) -> None:
         pad(*arguments)
-        controller.show_light_field(other)
+        controller.show_light_field(light_field(3, 3))
 
     monkeypatch.setattr(viewpoint_pad, "draw", opening_pad)
     viewer.draw()
