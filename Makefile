@@ -67,7 +67,7 @@ clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info
 
 # The program is installed in place, in the versions of constraints.txt; touched last, so that a broken set-up is done again.
-$(VENV)/ready: pyproject.toml constraints.txt $(wildcard lfcore/kernels/*.[ch])
+$(VENV)/ready: pyproject.toml constraints.txt $(wildcard lfcore/kernels/*.[ch] app/painting/*.[ch])
 	@$(find_python); \
 	$(make_venv); \
 	echo "Setting up in $(VENV) (once; about 1.3 GB, most of it torch) ..."; \

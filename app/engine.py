@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry import Point
+from app.painting import in_bytes
 from app.readout import ScoreText
 from app.scoring import DEFAULT_RULE
 from app.scoring import score as scored
@@ -18,7 +19,6 @@ from app.worker import Cancel
 from lfcore.cache import CacheKey, SynthesisCache, cache_key, held_bytes
 from lfcore.errors import InputError, LfviewError, OutputError, WeightsError
 from lfcore.lightfield import FloatArray, LightField
-from lfcore.metrics import to_uint8
 from lfcore.store import ViewStore
 from lfcore.synthesis import Synthesis, Synthesizer, WeighingSynthesizer, weighs
 
@@ -349,14 +349,7 @@ class Engine:
 
 def _answer(synthesis: Synthesis, *, final: bool, kept: bool, score: ScoreText | None) -> Answer:
     step = Step.REALTIME if synthesis.model == _NAME_OF_SMALL_NETWORKS else Step.FULL
-    return Answer(synthesis, _pixels(synthesis.image), step, final, kept, score, _percentiles(synthesis.disparity))
-
-
-def _pixels(image: FloatArray) -> npt.NDArray[np.uint8]:
-    pixels = np.empty((*image.shape[:2], 4), np.uint8)
-    pixels[..., :3] = to_uint8(image)
-    pixels[..., 3] = 255
-    return pixels
+    return Answer(synthesis, in_bytes(synthesis.image), step, final, kept, score, _percentiles(synthesis.disparity))
 
 
 def _score(light_field: LightField, synthesis: Synthesis, rule: str) -> ScoreText | None:
@@ -368,8 +361,10 @@ def _score(light_field: LightField, synthesis: Synthesis, rule: str) -> ScoreTex
 def _percentiles(disparity: FloatArray | None) -> tuple[float, ...] | None:
     if disparity is None:
         return None
-    values = np.percentile(disparity[::_PERCENTILE_STRIDE, ::_PERCENTILE_STRIDE], PERCENTILES)
-    return tuple(float(value) for value in values)
+    # Sorted once, which is several times as fast as np.percentile, and holds the others' interpreter lock for less.
+    values = np.sort(disparity[::_PERCENTILE_STRIDE, ::_PERCENTILE_STRIDE], axis=None)
+    places = np.multiply(PERCENTILES, (len(values) - 1) / 100)
+    return tuple(np.interp(places, np.arange(len(values)), values).tolist())
 
 
 def disparity_range(percentiles: tuple[float, ...], tail: float) -> tuple[float, float]:

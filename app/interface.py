@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,8 +15,8 @@ import moderngl
 import numpy as np
 from imgui_bundle import ImVec4, imgui
 
-from app import panels, theme
-from app.canvas import Canvas, Colours, Frame, Target, draws_in_software, spread_rasteriser
+from app import painting, panels, theme
+from app.canvas import Canvas, Colours, Frame, Pixels, Target, WindowCopy, draws_in_software, spread_rasteriser
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
 from app.commands import Action, OpenPath, Request
@@ -44,10 +46,18 @@ _log = logging.getLogger(__name__)
 
 
 class Interface:
-    """Draws frames into a framebuffer. Belongs to the thread on which the GL context and the imgui context are current."""
+    """Draws frames into a framebuffer. Belongs to the thread on which the GL context and the imgui context are current.
+
+    load: of a window, the addresses of OpenGL's functions by name.
+    """
 
     def __init__(
-        self, controller: Controller, context: moderngl.Context, scale: float, surroundings: Surroundings | None = None
+        self,
+        controller: Controller,
+        context: moderngl.Context,
+        scale: float,
+        surroundings: Surroundings | None = None,
+        load: Callable[[str], int] | None = None,
     ) -> None:
         self.controller = controller
         self.surroundings = surroundings or Surroundings(controller, wake=lambda: None)
@@ -56,7 +66,11 @@ class Interface:
         self.in_software = draws_in_software(context)
         if self.in_software:
             spread_rasteriser()
-        self._canvas = Canvas(context, reach=CARRIED_IN_SOFTWARE if self.in_software else CARRIED)
+        reach = CARRIED_IN_SOFTWARE if self.in_software else CARRIED
+        self._paints = self.in_software and painting.compiled()
+        self._canvas = Canvas(
+            context, reach=reach, paints=self._paints, copy=WindowCopy(load) if self._paints and load is not None else None
+        )
         self._atlas = Atlas(context)
         self._fonts = theme.apply(scale)
         self._theme = Theme.DARK
@@ -71,6 +85,7 @@ class Interface:
         self._timer = self._canvas.timer()
         self._timed = False  # a picture was made in the last frame
         self._prepared: Frame | None = None  # what has been made in this one of what the canvas has taken
+        self._cleared = False  # the window has its grounds in this one
         self._saving = False  # the picture of this frame is to be saved
         self._picture_ms: float | None = None
         self._faults = 0  # frames in a row that have failed
@@ -142,8 +157,10 @@ class Interface:
         self._synchronise_exhibit()
         if self._light_field is not None:
             self._draw_picture(target, layout, pixels)
-        elif self._exhibit is not None:
-            self._draw_exhibit(self._exhibit, target, layout, pixels)
+        else:
+            self._clear(target, layout, pixels)
+            if self._exhibit is not None:
+                self._draw_exhibit(self._exhibit, target, layout, pixels)
         if self._saving:
             self._save_picture(target, layout, pixels)
         target.framebuffer.use()
@@ -155,19 +172,44 @@ class Interface:
         Software rasterisers make the picture in threads of their own, which begin when another target is drawn into: while the
         panels are laid out, and not after that.
         """
-        self._prepared = None
+        self._prepared, self._cleared = None, False
         if self._light_field is not None:
             self._prepare()
+            if self._copied(layout, pixels) is None:
+                self._clear(target, layout, pixels)
+
+    def _copied(self, layout: Layout, pixels: float) -> Pixels | None:
+        """Where the window becomes the picture by copying; None where it is drawn, or there are several."""
+        panes = arrange(self.controller.state, layout.picture)
+        if len(panes) > 1 or panes[0].partner or self._prepared is None:
+            return None
+        placement = panes[0].placement(self.controller.state.zoom, self._canvas.picture_size(self._prepared.look))
+        return self._canvas.copied(self._prepared, _scaled(panes[0].clip, pixels), _magnified(placement, pixels))
+
+    def _clear(self, target: Target, layout: Layout, pixels: float, around: Pixels | None = None) -> None:
+        """Give the window its grounds, once a frame."""
+        if self._cleared:
+            return
+        self._cleared = True
         grounds = [area for area in (layout.panel, layout.status) if area is not None]
-        self._canvas.begin(target, [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in grounds], _rgb(theme.BACKGROUND))
+        rectangles = [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in grounds]
+        self._canvas.begin(target, rectangles, _rgb(theme.BACKGROUND), around)
 
     def _prepare(self) -> None:
         """Make the picture at the light field's own size, and time it."""
         if self._timed:  # asked one frame later, when the graphics have done it, so that nothing waits
             self._picture_ms = 1e-6 * self._timer.elapsed
+            self._timed = False
         self._prepared = self._frame()
+        if self._canvas.painted:  # as before this one: the graphics are not held up by asking them for the time
+            begun = time.perf_counter()
+            made = self._canvas.prepare(self._prepared)
+            if made and self._canvas.painted:
+                self._picture_ms = 1e3 * (time.perf_counter() - begun)
+            return
         with self._timer:
-            self._timed = self._canvas.prepare(self._prepared)
+            made = self._canvas.prepare(self._prepared)
+        self._timed = made and not self._canvas.painted
 
     @property
     def next_frame_in(self) -> float | None:
@@ -331,11 +373,16 @@ class Interface:
         frame = self._frame()
         if frame != self._prepared:  # the panels have changed it, or the canvas has taken more since
             self._canvas.prepare(frame)
+            self._prepared = frame
+        copied = self._copied(layout, pixels)
+        if copied is None:
+            self._clear(target, layout, pixels)
         state = self.controller.state
         for pane in arrange(state, layout.picture):
             shown = self._partner_frame() if pane.partner else frame
             placement = pane.placement(state.zoom, self._canvas.picture_size(shown.look))
             self._canvas.draw(shown, target, _scaled(pane.clip, pixels), _magnified(placement, pixels))
+        self._clear(target, layout, pixels, copied)
         if layout.strips is not None and state.sliced is not None:
             self._draw_slices(layout.strips, state.sliced, target, arrange(state, layout.picture)[0], pixels)
 

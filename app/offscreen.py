@@ -16,7 +16,7 @@ import OpenImageIO as oiio
 from imgui_bundle import ImVec2, imgui
 
 from app import frametimes
-from app.canvas import Target, standalone_context
+from app.canvas import Target, standalone_context, standalone_functions
 from app.controller import Controller
 from app.frametimes import FrameTimes
 from app.geometry import Size
@@ -44,7 +44,7 @@ class Offscreen:
         self._context = context
         self._texture = context.texture(size, 4)
         self._target = Target(context.framebuffer([self._texture]), size)
-        self.interface = Interface(controller, context, scale)
+        self.interface = Interface(controller, context, scale, load=standalone_functions())
         self._pace = Pace(frametimes.FRAME_SECONDS, core_count())
 
     def frame(self) -> Picture:

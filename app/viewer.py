@@ -179,7 +179,9 @@ class _Window:
             self._go_to(place)
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
-        self._context = windowed_context(_Loader())
+        loader = _Loader()
+        self._load = loader.load_opengl_function
+        self._context = windowed_context(loader)
         self._target = self._context.detect_framebuffer(0)
         self._pace = Pace(_frame_interval(), core_count())
         self._drawn_at = -math.inf  # when the last frame was begun
@@ -207,7 +209,7 @@ class _Window:
 
     def attach(self, controller: Controller, surroundings: Surroundings) -> None:
         """Show this controller's light field from now on."""
-        self._interface = Interface(controller, self._context, self._scale, surroundings)
+        self._interface = Interface(controller, self._context, self._scale, surroundings, self._load)
 
     def place(self) -> WindowPlace:
         """Where the window is; of a maximised one where it would go back to."""

@@ -98,7 +98,19 @@ def compiled_kernels() -> None:
     """They are there; else the test is skipped, and fails in CI, where they should have been compiled."""
     from lfcore import kernels
 
-    if not kernels.compiled():
-        if os.environ.get("CI"):
-            pytest.fail("the kernels have not been compiled; the set-up should have a C compiler")
-        pytest.skip("this installation has no compiled kernels")
+    _want(kernels.compiled(), "kernels")
+
+
+@pytest.fixture
+def compiled_painting() -> None:
+    """Likewise."""
+    from app import painting
+
+    _want(painting.compiled(), "painting")
+
+
+def _want(there: bool, what: str) -> None:
+    if not there and os.environ.get("CI"):
+        pytest.fail(f"the compiled {what} is not there; the set-up should have a C compiler")
+    if not there:
+        pytest.skip(f"this installation has no compiled {what}")

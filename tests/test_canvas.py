@@ -15,8 +15,8 @@ from app import glsl
 from app.canvas import BACKGROUND, Canvas, Frame, Target
 from app.canvas.passes import Pass
 from app.comparison import Source
-from app.engine import _pixels
 from app.geometry import Rect, Zoom, place
+from app.painting import in_bytes
 from app.state import CARRIED, CARRIED_IN_SOFTWARE, Look, Reach
 from app.tone import Curve, Tone
 from lfcore import colormaps
@@ -44,7 +44,7 @@ def random_corners(dtype: str, seed: int = 0) -> npt.NDArray[np.generic]:
 
 def give(canvas: Canvas, image: FloatArray, disparity: FloatArray | None, viewpoint: tuple[float, float]) -> None:
     """Hand a synthesis to the canvas, as the interface does."""
-    canvas.set_synthesis(image, _pixels(image), disparity, viewpoint)
+    canvas.set_synthesis(image, in_bytes(image), disparity, viewpoint)
 
 
 def moving_corners() -> FloatArray:

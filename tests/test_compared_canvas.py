@@ -11,7 +11,7 @@ from moving_scene import DISPARITY, SIZE, truth
 
 from app.canvas import Canvas, Frame
 from app.comparison import BLOCK_RANGE, Difference, Source
-from app.engine import _pixels
+from app.painting import in_bytes
 from app.state import Look
 from lfcore import colormaps
 from lfcore.lightfield import CORNERS, FloatArray, as_float
@@ -23,7 +23,7 @@ HERE = (0.5, 0.5)
 def canvas(gl: Any) -> Iterator[Canvas]:
     made = Canvas(gl, "f4")
     made.set_light_field(np.stack([truth(u, v) for u, v in CORNERS]))
-    made.set_synthesis(truth(*HERE), _pixels(truth(*HERE)), np.full(SIZE, DISPARITY, np.float32), HERE)
+    made.set_synthesis(truth(*HERE), in_bytes(truth(*HERE)), np.full(SIZE, DISPARITY, np.float32), HERE)
     yield made
     made.clear()
     assert gl.error == "GL_NO_ERROR"
@@ -56,7 +56,7 @@ def test_each_kind_of_difference_is_what_its_name_says(canvas: Canvas, differenc
     captured = (other_picture(1) * 255).round()
     partner = other_picture(2)
     canvas.set_light_field(np.zeros((4, *SIZE, 3), np.uint8))
-    canvas.set_synthesis(truth(*HERE), _pixels(truth(*HERE)), None, HERE)
+    canvas.set_synthesis(truth(*HERE), in_bytes(truth(*HERE)), None, HERE)
     canvas.set_captured(captured.astype(np.uint8))
     canvas.set_partner(partner)
     d = truth(*HERE) - (as_float(captured.astype(np.uint8)) if source is Source.CAPTURED else partner)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from canvas_maps import map_of
 
 from app.canvas import Canvas, Frame
-from app.engine import _pixels
 from app.focusing import (
     APERTURE_LIMITS,
     Choice,
@@ -22,6 +22,7 @@ from app.focusing import (
     share_of_slice,
 )
 from app.layout import lay_out, with_strips
+from app.painting import in_bytes
 from app.plain_json import from_json, to_json
 from app.state import Look
 from lfcore.key_frames import MAX_FOCUS
@@ -42,11 +43,11 @@ def test_the_disparity_of_a_point_is_that_of_the_shader(canvas: Canvas) -> None:
     canvas.set_light_field(np.zeros((4, height, width, 3), np.uint8))
     image = np.zeros((height, width, 3), np.float32)
     made_at = (0.5, 0.4)
-    canvas.set_synthesis(image, _pixels(image), disparity, made_at)
+    canvas.set_synthesis(image, in_bytes(image), disparity, made_at)
     chance = np.random.default_rng(0)
     for viewpoint in (made_at, (0.1, 0.9), (1.2, -0.2)):
         frame = Frame(Look.DISPARITY, viewpoint)
-        carried = np.frombuffer(canvas._texture_of(frame).read(), np.float32).reshape(height, width)
+        carried = map_of(canvas, frame)
         for _ in range(60):
             px, py = int(chance.integers(width)), int(chance.integers(height))
             found = carried_disparity(disparity, made_at, viewpoint, (px + 0.7, py + 0.2))

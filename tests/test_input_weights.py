@@ -15,8 +15,9 @@ from remote_models import Weigher, make
 
 from app.canvas import Canvas, Frame
 from app.controller import Controller
-from app.engine import Engine, _pixels
+from app.engine import Engine
 from app.looking import CORNER_COLOURS, Looking
+from app.painting import in_bytes
 from app.samples import Part, Samples
 from app.state import Look
 from lfcore.cache import CacheKey, SynthesisCache
@@ -176,7 +177,7 @@ def canvas(gl: Any) -> Iterator[Canvas]:
 
 def give(canvas: Canvas, disparity: FloatArray, weights: Any) -> None:
     image = np.full((*SIZE, 3), 0.5, np.float32)
-    canvas.set_synthesis(image, _pixels(image), disparity, VIEWPOINT, weights)
+    canvas.set_synthesis(image, in_bytes(image), disparity, VIEWPOINT, weights)
 
 
 def test_weights_are_drawn_as_the_mean_of_the_inputs_colours(canvas: Canvas) -> None:

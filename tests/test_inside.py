@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from canvas_maps import map_of
 
 from app.canvas import Canvas, Frame
-from app.engine import _pixels
 from app.looking import CORNER_COLOURS, LEVEL_LIMITS, LEVEL_STEP
+from app.painting import in_bytes
 from app.state import Look
 from lfcore import colormaps
 from lfcore.colormaps import ColourMap
@@ -39,12 +40,7 @@ def corners() -> FloatArray:
 
 
 def give(canvas: Canvas, image: FloatArray, disparity: FloatArray) -> None:
-    canvas.set_synthesis(image, _pixels(image), disparity, VIEWPOINT)
-
-
-def values_of(canvas: Canvas, frame: Frame) -> FloatArray:
-    """The map (H, W) behind the colours."""
-    return np.frombuffer(canvas._texture_of(frame).read(), np.float32).reshape(HEIGHT, WIDTH)
+    canvas.set_synthesis(image, in_bytes(image), disparity, VIEWPOINT)
 
 
 def test_disagreement_is_the_deviation_of_the_warped_inputs(canvas: Canvas, corners: FloatArray) -> None:
@@ -68,7 +64,7 @@ def test_disagreement_is_the_deviation_of_the_warped_inputs(canvas: Canvas, corn
         if len(seen) > 1:
             expected[row, column] = np.sqrt(seen.astype(float).var(axis=0, ddof=1).mean())
     assert counts.all(0).any() and not counts.all()
-    np.testing.assert_allclose(values_of(canvas, Frame(Look.DISAGREEMENT, VIEWPOINT)), expected, atol=1e-5)
+    np.testing.assert_allclose(map_of(canvas, Frame(Look.DISAGREEMENT, VIEWPOINT)), expected, atol=1e-5)
 
 
 @pytest.mark.parametrize("level", [0.0, 3.7, -12.0])
@@ -79,7 +75,7 @@ def test_the_sweep_is_what_the_disparity_network_sees(canvas: Canvas, corners: F
     expected = plane_sweep(luma, corner_offsets(*VIEWPOINT), Levels(1, level, level), whole)[0].numpy()  # (2, H, W)
     mean = canvas.read(Frame(Look.SWEEP_MEAN, VIEWPOINT, level=level))
     np.testing.assert_allclose(mean, np.repeat(expected[0][..., None], 3, axis=2), atol=1e-5)
-    deviation = values_of(canvas, Frame(Look.SWEEP_DEVIATION, VIEWPOINT, level=level))
+    deviation = map_of(canvas, Frame(Look.SWEEP_DEVIATION, VIEWPOINT, level=level))
     np.testing.assert_allclose(deviation, expected[1], atol=2e-5)
 
 
@@ -118,7 +114,7 @@ def test_maps_are_shown_in_every_colour_map(canvas: Canvas, corners: FloatArray,
 def test_deviations_are_shown_from_none_to_white_over_gain(canvas: Canvas, corners: FloatArray) -> None:
     canvas.set_light_field(corners)
     frame = Frame(Look.SWEEP_DEVIATION, VIEWPOINT, level=1.0, gain=4.0, colour_map=ColourMap.GREY)
-    expected = colormaps.apply(colormaps.colours(ColourMap.GREY), values_of(canvas, frame), 0.0, 0.25)
+    expected = colormaps.apply(colormaps.colours(ColourMap.GREY), map_of(canvas, frame), 0.0, 0.25)
     assert np.abs(255 * canvas.read(frame) - expected).max() <= 18  # grey rises steeply where it begins
 
 

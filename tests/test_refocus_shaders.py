@@ -12,7 +12,7 @@ from app.canvas.gathered import Captured, kept, spread_order
 from app.canvas.passes import Passes
 from app.canvas.refocus import Refocused, Wanted, coarse_views
 from app.canvas.textures import Textures
-from app.engine import _pixels
+from app.painting import in_bytes
 from app.tone import Tone
 from lfcore.lightfield import CORNERS, FloatArray, LightField
 from lfcore.refocus import aperture_weights, refocus
@@ -43,7 +43,7 @@ class Bench:
         """A synthesis, as the canvas takes it."""
         textures = self.textures
         width, height = textures.size
-        textures.syntheses.write(_pixels(image), viewport=(0, 0, textures.newest, width, height, 1))
+        textures.syntheses.write(in_bytes(image), viewport=(0, 0, textures.newest, width, height, 1))
         textures.disparity_map.write(disparity)
         textures.disparity_range = float(disparity.min()), float(disparity.max())
         textures.made_at = textures.newest_at = viewpoint

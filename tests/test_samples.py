@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from app.canvas import Canvas, Frame
-from app.engine import _pixels
 from app.looking import Looking
+from app.painting import in_bytes
 from app.samples import Part, Samples
 from app.state import Look
 from app.tone import Curve, Tone
@@ -52,7 +52,7 @@ def samples(light_field: LightField) -> Samples:
 
 def drawn(canvas: Canvas, samples: Samples, light_field: LightField, look: Look) -> FloatArray:
     canvas.set_light_field(np.stack([light_field.views[-int(v), -int(u)] for u, v in CORNERS]))
-    canvas.set_synthesis(samples.image, _pixels(samples.image), samples.disparity, VIEWPOINT)
+    canvas.set_synthesis(samples.image, in_bytes(samples.image), samples.disparity, VIEWPOINT)
     return canvas.read(
         Frame(
             look,

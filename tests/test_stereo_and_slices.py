@@ -12,10 +12,10 @@ from moving_scene import DISPARITY, SIZE, light_field, truth
 
 from app.canvas import Canvas, Frame, Target
 from app.canvas.slices import Slicing
-from app.engine import _pixels
 from app.focusing import Focusing, place_in_slice
 from app.geometry import Placement, Rect
 from app.layout import Strips
+from app.painting import in_bytes
 from app.state import Look
 from app.tone import Tone
 from lfcore.lightfield import CORNERS, FloatArray
@@ -32,7 +32,7 @@ def canvas(gl: Any) -> Iterator[Canvas]:
     scene = light_field(5, 5)
     made.set_views(scene.views, scene.dark)
     image = truth(*HERE)
-    made.set_synthesis(image, _pixels(image), np.full(SIZE, DISPARITY, np.float32), HERE)
+    made.set_synthesis(image, in_bytes(image), np.full(SIZE, DISPARITY, np.float32), HERE)
     yield made
     made.clear()
     assert gl.error == "GL_NO_ERROR"
@@ -71,7 +71,7 @@ def test_in_an_anaglyph_grey_stays_grey_and_each_filter_has_its_eye(canvas: Canv
     for value in (0.2, 0.7):
         grey = np.full((*SIZE, 3), value, np.float32)
         canvas.set_light_field(np.stack([grey] * 4))
-        canvas.set_synthesis(grey, _pixels(grey), np.zeros(SIZE, np.float32), HERE)
+        canvas.set_synthesis(grey, in_bytes(grey), np.zeros(SIZE, np.float32), HERE)
         shown = canvas.read(Frame(Look.ANAGLYPH, HERE, focusing=flat))
         np.testing.assert_allclose(shown, value, atol=0.006)
     # A white bar that the eyes see at different places: its red part is where the left eye sees it.
@@ -83,7 +83,7 @@ def test_in_an_anaglyph_grey_stays_grey_and_each_filter_has_its_eye(canvas: Canv
     image = np.zeros((*SIZE, 3), np.float32)
     image[:, 60:64] = 1
     canvas.set_light_field(corners)
-    canvas.set_synthesis(image, _pixels(image), np.full(SIZE, disparity, np.float32), HERE)
+    canvas.set_synthesis(image, in_bytes(image), np.full(SIZE, disparity, np.float32), HERE)
     shown = canvas.read(Frame(Look.ANAGLYPH, HERE, focusing=replace(flat, baseline=0.4)))[HEIGHT // 2]
     # The left eye is at u = 0.3, and near content lies farther to the right there.
     assert shown[64:68, 0].min() > 0.9 and shown[64:68, 1:].max() < 0.1
@@ -157,7 +157,7 @@ def test_syntheses_for_the_eyes_take_the_place_of_carried_ones(canvas: Canvas) -
     eyes = focusing.eyes(HERE)
     carried = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing))
     assert np.abs(carried - 0.5).max() > 0.2
-    grey = _pixels(np.full((*SIZE, 3), 0.5, np.float32))
+    grey = in_bytes(np.full((*SIZE, 3), 0.5, np.float32))
     canvas.set_eyes({eyes[1]: grey})
     pair = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing))
     np.testing.assert_array_equal(pair[:, :WIDTH], carried[:, :WIDTH])
@@ -174,7 +174,7 @@ def test_syntheses_for_the_eyes_take_the_place_of_carried_ones(canvas: Canvas) -
 
 def test_a_synthesis_for_an_eye_is_moved_by_the_convergence(canvas: Canvas) -> None:
     focusing = Focusing(baseline=0.4, convergence=DISPARITY)
-    canvas.set_eyes({eye: _pixels(truth(*eye)) for eye in focusing.eyes(HERE)})
+    canvas.set_eyes({eye: in_bytes(truth(*eye)) for eye in focusing.eyes(HERE)})
     pair = canvas.read(Frame(Look.STEREO_PARALLEL, HERE, focusing=focusing))
     for half in (pair[:, :WIDTH], pair[:, WIDTH:]):
         np.testing.assert_allclose(half[INSIDE], truth(*HERE)[INSIDE], atol=0.006)

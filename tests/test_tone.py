@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from app.canvas import Canvas, Frame
-from app.engine import _pixels
 from app.looking import Looking
+from app.painting import in_bytes
 from app.state import Look
 from app.tone import GAMMA_LIMITS, STOPS_LIMITS, Curve, Tone, toned
 
@@ -48,7 +48,7 @@ def test_every_picture_is_shown_in_every_tone(canvas: Canvas) -> None:
     corners[0, 0, 0] = (0.0, 0.001, 0.003)  # the straight part of sRGB
     image = corners[0].copy()
     canvas.set_light_field(corners)
-    canvas.set_synthesis(image, _pixels(image), np.zeros((6, 7), np.float32), (0.0, 0.0))
+    canvas.set_synthesis(image, in_bytes(image), np.zeros((6, 7), np.float32), (0.0, 0.0))
     for tone in TONES:
         expected = np.array([[by_definition(tuple(pixel), tone) for pixel in row] for row in image])
         for look in (Look.SYNTHESIS, Look.WARPED_TOP_LEFT):  # at (0, 0) with no disparity, that input is the picture

@@ -1,9 +1,11 @@
 """Textures, passes and read-back: the only place that knows moderngl."""
 
 from app.canvas.canvas import Canvas
-from app.canvas.contexts import draws_in_software, standalone_context, windowed_context
+from app.canvas.contexts import draws_in_software, standalone_context, standalone_functions, windowed_context
+from app.canvas.copying import WindowCopy
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.magnifier import Colours
+from app.canvas.placing import Pixels
 from app.canvas.rasteriser import spread_rasteriser
 
 __all__ = [
@@ -11,9 +13,12 @@ __all__ = [
     "Canvas",
     "Colours",
     "Frame",
+    "Pixels",
     "Target",
+    "WindowCopy",
     "draws_in_software",
     "spread_rasteriser",
     "standalone_context",
+    "standalone_functions",
     "windowed_context",
 ]

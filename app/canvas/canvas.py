@@ -1,8 +1,10 @@
 """The picture in the window.
 
 Every way of looking is a shader over the same textures: the four corner views, the newest synthesis with its disparity
-map, the synthesis before it, and the captured view. Nothing shown is computed on the CPU. What is shown is made at the
-light field's own size in 8 bits, as the screen has, and only when it has changed; the window then magnifies it.
+map, the synthesis before it, and the captured view. What is shown is made at the
+light field's own size in 8 bits, as the screen has, and only when it has changed; the window then magnifies it. Only where
+there is no GPU, and the processor does the graphics' work anyway, does it make the most common pictures by code of its own
+(app.painting), which is faster than shaders are there.
 """
 
 from __future__ import annotations
@@ -15,11 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from app.canvas.compared import Compared
+from app.canvas.copying import WindowCopy
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.inside import Inside
 from app.canvas.magnifier import Colours, Magnifier
+from app.canvas.painted import Painted, PaintedSynthesized
 from app.canvas.passes import Passes
-from app.canvas.placing import shown_size
+from app.canvas.placing import Pixels, shown_size, visible
 from app.canvas.refocus import Refocused, Wanted
 from app.canvas.slices import Slices, Slicing
 from app.canvas.stereo import Stereo
@@ -49,8 +53,7 @@ class _Makers:
     stereo: Stereo
 
     @staticmethod
-    def of(context: moderngl.Context, passes: Passes, textures: Textures, reach: Reach) -> _Makers:
-        synthesized = Synthesized(passes, textures, reach)
+    def of(context: moderngl.Context, passes: Passes, textures: Textures, synthesized: Synthesized) -> _Makers:
         refocused = Refocused(context, passes, textures)
         return _Makers(
             textures,
@@ -67,14 +70,24 @@ class Canvas:
     """The picture in the window. All methods need the GL context to be current, on the thread that made the canvas.
 
     `picture_type`: moderngl's type of the pictures that are shown; "f1" is 8 bits, "f4" float32 to read them back exactly.
-    `reach`: how far a synthesis is carried, see app.state.
+    `reach`: how far a synthesis is carried, see app.state. `paints`: the processor makes pictures by app.painting, which must
+    be compiled; `copy`: and those are copied into the window.
     """
 
-    def __init__(self, context: moderngl.Context, picture_type: str = "f1", reach: Reach = CARRIED) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        picture_type: str = "f1",
+        reach: Reach = CARRIED,
+        paints: bool = False,
+        copy: WindowCopy | None = None,
+    ) -> None:
         self.context = context
         self.passes = Passes(context)
         self._picture_type = picture_type
         self._reach = reach
+        self._synthesizes = PaintedSynthesized if paints else Synthesized
+        self._copy = copy
         for fragment in ("blend.frag", "instant.frag", "exact.frag", "fade.frag"):
             self.passes.get(fragment)  # compiled now, so that the hand's first movement does not wait for them
         for fade in ("fade_none.glsl", "fade_older.glsl"):
@@ -84,6 +97,7 @@ class Canvas:
         self._resting_place = context.simple_framebuffer((1, 1))
         self._makers: _Makers | None = None
         self.unfinished = False  # the frame prepared last becomes better with the next ones
+        self.painted = False  # it has been made by the processor's own code
         self._exhibit: moderngl.Texture | None = None  # what is shown in place of a light field
 
     # What there is to draw.
@@ -99,7 +113,8 @@ class Canvas:
             )
         self.clear()
         textures = Textures(self.context, corners, self._picture_type)
-        self._makers = _Makers.of(self.context, self.passes, textures, self._reach)
+        synthesized = self._synthesizes(self.passes, textures, self._reach)
+        self._makers = _Makers.of(self.context, self.passes, textures, synthesized)
 
     def warm_up(self, target: Target) -> None:
         """Run every pass of the moving picture once on a made-up light field, into the target; there must be no other.
@@ -118,8 +133,8 @@ class Canvas:
             for viewpoint in (here, near, between, far):
                 self.prepare(Frame(Look.SYNTHESIS, viewpoint, share=share))
         self.prepare(Frame(Look.SYNTHESIS, near, share=0.5))
-        for scale in (0.5, 1.0, 2.0):
-            self.draw(Frame(Look.SYNTHESIS, here), target, Rect(0, 0, *size), Placement(scale, (0.0, 0.0)))
+        for scale in (0.5, 1.0, 2.0):  # dimmed, since other pictures are copied where that can be
+            self.draw(Frame(Look.SYNTHESIS, here, dim=0.5), target, Rect(0, 0, *size), Placement(scale, (0.0, 0.0)))
         self.clear()
 
     def check_memory(self) -> None:
@@ -131,12 +146,13 @@ class Canvas:
         """Forget the light field and everything that belongs to it."""
         self._resting_place.use()
         if self._makers is not None:
+            self._makers.synthesized.release()
             self._makers.compared.release()
             self._makers.refocused.release()
             self._makers.stereo.release()
             self._makers.textures.release()
             self._makers = None
-        self.unfinished = False
+        self.unfinished = self.painted = False
 
     def set_synthesis(
         self,
@@ -150,21 +166,9 @@ class Canvas:
         or None, its (u, v), and where they are known the weights (4, H, W) of the inputs in it, 255 = whole.
 
         The one before is kept for the cross-fade. Both are carried in 8 bits, which costs a software rasteriser half the time.
+        None of it may be changed afterwards: it is handed to the graphics when they need it.
         """
-        textures = self._at_hand.textures
-        textures.older_at, textures.newest_at = textures.newest_at, viewpoint
-        textures.newest = 1 - textures.newest
-        width, height = textures.size
-        textures.syntheses.write(pixels, viewport=(0, 0, textures.newest, width, height, 1))
-        textures.exact.write(np.ascontiguousarray(image, np.float32))
-        if disparity is not None:
-            textures.disparity_map.write(np.ascontiguousarray(disparity, np.float32))
-            textures.disparity_range = float(disparity.min()), float(disparity.max())
-            textures.made_at = viewpoint
-        textures.weighed = weights is not None and disparity is not None
-        if weights is not None:
-            textures.weights.write(np.ascontiguousarray(np.moveaxis(weights, 0, 2)))
-        textures.current.clear()
+        self._at_hand.synthesized.take(image, pixels, disparity, viewpoint, weights)
 
     def set_captured(self, view: npt.NDArray[np.generic]) -> None:
         """Take the captured view (H, W, 3), as stored, to be compared with or looked at."""
@@ -235,16 +239,20 @@ class Canvas:
         target: Target,
         rectangles: Sequence[tuple[Rect, tuple[float, float, float]]] = (),
         background: tuple[float, float, float] = BACKGROUND,
+        around: Pixels | None = None,
     ) -> None:
         """Start a frame: all of the target in the background colour, and rectangles (in its pixels, y downwards) in others.
+        around: where there is a picture already, on which none of the rectangles lies.
 
         Clearing is the cheapest way of filling that there is, which counts where the processor draws.
         """
         framebuffer, (width, height) = target.framebuffer, target.size
         framebuffer.viewport = framebuffer.scissor = (0, 0, width, height)
         framebuffer.use()
-        framebuffer.clear(*background, 1.0)
-        for area, colour in rectangles:
+        if around is None:
+            framebuffer.clear(*background, 1.0)
+        areas = [(strip, background) for strip in around.surroundings(target.size)] if around is not None else []
+        for area, colour in (*areas, *rectangles):
             left, right = round(area.x), round(area.x + area.width)
             top, bottom = round(area.y), round(area.y + area.height)
             framebuffer.clear(*colour, 1.0, viewport=(left, height - bottom, right - left, bottom - top))
@@ -254,13 +262,25 @@ class Canvas:
         made = self._at_hand.textures.made
         refocused = frame.look is Look.REFOCUS
         self.unfinished = self._at_hand.refocused.advance(_wanted(frame)) if refocused else False
-        self._texture_of(frame)
+        self.painted = isinstance(self._made(frame), Painted)
         return self._at_hand.textures.made != made
+
+    def copied(self, frame: Frame, area: Rect, placement: Placement) -> Pixels | None:
+        """Which pixels of a target `draw` sets by copying, for which a target need not be cleared before; None: it draws.
+
+        To copy it has to wait for everything that has been drawn, be it only the clearing.
+        """
+        made = self._made(frame)
+        copies = isinstance(made, Painted) and self._copy is not None and frame.dim == 1.0 and self._copy.suits(placement)
+        return visible(self._at_hand.textures.size, area, placement) if copies else None
 
     def draw(self, frame: Frame, target: Target, area: Rect, placement: Placement) -> None:
         """Draw the frame's picture into the target, inside the area (in its pixels, y downwards), at the placement."""
-        texture = self._texture_of(frame)
-        colours = _colours(frame)
+        made, colours = self._made(frame), _colours(frame)
+        if isinstance(made, Painted) and self._copy is not None and self.copied(frame, area, placement) is not None:
+            self._copy.image(made.pixels, target, area, placement)
+            return
+        texture = made.texture if isinstance(made, Painted) else made
         if colours is not None:
             self._magnifier.map(texture, colours, target, area, placement)
         else:
@@ -308,7 +328,7 @@ class Canvas:
         """A timer of what is drawn within it, by the graphics' own clock; read it one frame later, so that nothing waits."""
         return self.context.query(time=True)
 
-    def _texture_of(self, frame: Frame) -> moderngl.Texture:
+    def _made(self, frame: Frame) -> moderngl.Texture | Painted:
         """The picture, or the map, at the light field's own size."""
         makers, tone = self._at_hand, frame.tone
         if frame.look is Look.DISPARITY:
@@ -336,7 +356,8 @@ class Canvas:
             return refocused
         if frame.source is not Source.SYNTHESIS:
             return makers.compared.partner(frame.source, frame.viewpoint, tone).texture
-        return makers.synthesized.picture(frame.viewpoint, frame.share, tone).texture
+        made = makers.synthesized.picture(frame.viewpoint, frame.share, tone)
+        return made if isinstance(made, Painted) else made.texture
 
     @property
     def _at_hand(self) -> _Makers:

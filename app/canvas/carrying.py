@@ -19,8 +19,13 @@ def carrying(textures: Textures, viewpoint: Point, farthest: float | None = None
     baseline, if not to `viewpoint`. There must be a map."""
     made_at = textures.made_at
     assert made_at is not None
-    nearest, greatest = textures.disparity_range
-    distance = math.dist(made_at, viewpoint) if farthest is None else farthest
-    reach = distance * max(abs(nearest), abs(greatest))
-    steps = next((steps for most, steps in _STEPS if reach <= most), _MOST_STEPS)
-    return {"made_at": made_at, "nearest_disparity": nearest, "steps": steps, "viewpoint": viewpoint}
+    steps = steps_to(textures, viewpoint, farthest)
+    return {"made_at": made_at, "nearest_disparity": textures.disparity_range[0], "steps": steps, "viewpoint": viewpoint}
+
+
+def steps_to(textures: Textures, viewpoint: Point, farthest: float | None = None) -> int:
+    """How often disparities are looked up again; arguments as above."""
+    assert textures.made_at is not None
+    distance = math.dist(textures.made_at, viewpoint) if farthest is None else farthest
+    reach = distance * max(map(abs, textures.disparity_range))
+    return next((steps for most, steps in _STEPS if reach <= most), _MOST_STEPS)

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.canvas.passes import Passes
 from app.canvas.synthesized import Synthesized
-from app.canvas.textures import Picture, Textures, make_layers, make_texture
+from app.canvas.textures import Made, Picture, Textures, make_layers, make_texture
 from app.comparison import BLOCK_RANGE, Difference, Source
 from app.geometry import Point
 from app.tone import Tone
@@ -66,7 +66,7 @@ class Compared:
         textures = self._textures
         if textures.newest_at == viewpoint and share >= 1.0:
             # In float32, since the steps of 8 bits would be seen when they are multiplied by the gain.
-            shown = self._synthesized.copied(textures.precise, textures.exact, 0, Tone())
+            shown: Made = self._synthesized.copied(textures.precise, textures.exact, 0, Tone())
         else:
             shown = self._synthesized.picture(viewpoint, share, Tone())
         partner = self._made(self._precise_partner, source, viewpoint, Tone())

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable
+
 import moderngl
 
 from lfcore.errors import LfviewError
@@ -31,3 +34,10 @@ def standalone_context() -> moderngl.Context:
             f"Found no OpenGL 3.3 for drawing off screen ({error}); install EGL and a driver "
             f"(on Debian: libegl1 and libgl1-mesa-dri)."
         ) from error
+
+
+def standalone_functions() -> Callable[[str], int]:
+    """The addresses of OpenGL's functions by name, for the contexts of `standalone_context`, of which there must be one."""
+    address_of = ctypes.CDLL("libEGL.so.1").eglGetProcAddress
+    address_of.argtypes, address_of.restype = (ctypes.c_char_p,), ctypes.c_void_p
+    return lambda name: address_of(name.encode()) or 0

@@ -30,6 +30,17 @@ class Pixels:
     width: int
     height: int
 
+    def surroundings(self, size: Size) -> list[Rect]:
+        """What lies around it in a target of that size (width, height): above, below, to the left and to the right."""
+        width, height = size
+        right, bottom = self.x + self.width, self.y + self.height
+        return [
+            Rect(0, 0, width, self.y),
+            Rect(0, bottom, width, height - bottom),
+            Rect(0, self.y, self.x, self.height),
+            Rect(right, self.y, width - right, self.height),
+        ]
+
 
 def visible(picture: Size, area: Rect, placement: Placement) -> Pixels:
     """The whole window pixels that lie on the picture and inside the area."""

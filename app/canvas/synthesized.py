@@ -6,13 +6,16 @@ import math
 from collections.abc import Mapping
 
 import moderngl
+import numpy as np
+import numpy.typing as npt
 
 from app.canvas.carrying import carrying
 from app.canvas.passes import AnyTexture, Passes, Uniform
-from app.canvas.textures import Picture, Textures
+from app.canvas.textures import Made, Picture, Textures
 from app.geometry import Point
 from app.state import Reach, carried_share
 from app.tone import Tone
+from lfcore.lightfield import FloatArray
 
 
 class Synthesized:
@@ -24,19 +27,32 @@ class Synthesized:
         self._textures = textures
         self._reach = reach
 
-    def picture(self, viewpoint: Point, share: float, tone: Tone) -> Picture:
+    def take(
+        self,
+        image: FloatArray,
+        pixels: npt.NDArray[np.uint8],
+        disparity: FloatArray | None,
+        viewpoint: Point,
+        weights: npt.NDArray[np.uint8] | None,
+    ) -> None:
+        """Take the newest synthesis as `Canvas.set_synthesis` does."""
+        self._textures.take_synthesis(image, pixels, disparity, viewpoint, weights)
+
+    def release(self) -> None:
+        """Give memory of the graphics beside that of the textures back."""
+
+    def picture(self, viewpoint: Point, share: float, tone: Tone) -> Made:
         """The best picture of this viewpoint that can be made. share: how far the newest synthesis has been faded in."""
         textures = self._textures
         newest, older = textures.newest_at, textures.older_at if share < 1.0 else None
         if newest is None:
             return self._corners(viewpoint, False, tone)
         if newest == viewpoint and older in (viewpoint, None):
-            after = self.copied(textures.after, textures.exact, 0, tone)
+            after = self._newest(tone)
             if share >= 1.0:
                 return after
             if older is not None:
-                before = self.copied(textures.before, textures.syntheses, 1 - textures.newest, tone)
-                return self._mixed(before, after, share)
+                return self._mixed(self._older(tone), after, share)
             return self._mixed(self._corners(viewpoint, False, tone), after, share)
         if textures.made_at != newest:  # it has come without a disparity map, and so cannot be carried
             return self._corners(viewpoint, textures.made_at is not None, tone)
@@ -77,7 +93,15 @@ class Synthesized:
             )
         return textures.disparity
 
-    def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: Tone) -> Picture:
+    def _newest(self, tone: Tone) -> Made:
+        """The newest synthesis as it is."""
+        return self.copied(self._textures.after, self._textures.exact, 0, tone)
+
+    def _older(self, tone: Tone) -> Made:
+        """The one before."""
+        return self.copied(self._textures.before, self._textures.syntheses, 1 - self._textures.newest, tone)
+
+    def _carried(self, viewpoint: Point, older: Point | None, share: float, tone: Tone) -> Made:
         """The newest synthesis, and where `older` is given also that one, carried to the viewpoint."""
         textures = self._textures
         result = textures.after
@@ -105,7 +129,7 @@ class Synthesized:
             self._passes.toned("blend.frag", tone).render(views, {"viewpoint": viewpoint})
         return result
 
-    def _mixed(self, before: Picture, after: Picture, share: float) -> Picture:
+    def _mixed(self, before: Made, after: Made, share: float) -> Made:
         result = self._textures.picture
         if result.outdated("mixed", before.made_for, after.made_for, share):
             result.target.use()

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
+from typing import Generic, Protocol, TypeVar
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from app.geometry import Point, Size
-from lfcore.lightfield import CORNERS
+from lfcore.lightfield import CORNERS, FloatArray
+
+_AnyTexture = TypeVar("_AnyTexture", moderngl.Texture, moderngl.TextureArray)
 
 TEXTURE_TYPES = {"uint8": "f1", "uint16": "nu2", "float32": "f4"}  # numpy type to moderngl's normalised texture type
+
+
+class Made(Protocol):
+    """A picture at the light field's own size that has been made."""
+
+    @property
+    def texture(self) -> moderngl.Texture:
+        """What the graphics sample."""
+
+    @property
+    def made_for(self) -> tuple[object, ...]:
+        """What it was last made for."""
 
 
 class Picture:
@@ -48,6 +64,30 @@ class Picture:
                 vars(self).pop(made).release()
 
 
+class Handed(Generic[_AnyTexture]):
+    """A texture to which what has come is handed when it is next sampled: most looks need little of it."""
+
+    def __init__(self, texture: _AnyTexture) -> None:
+        self._texture: _AnyTexture = texture
+        self._waiting: dict[int, Callable[[_AnyTexture], None]] = {}  # by layer
+
+    def take(self, write: Callable[[_AnyTexture], None], layer: int = 0) -> None:
+        """`write` is to be called with the texture, in place of what was to write this layer before."""
+        self._waiting[layer] = write
+
+    @property
+    def texture(self) -> _AnyTexture:
+        """What is sampled."""
+        for write in self._waiting.values():
+            write(self._texture)
+        self._waiting.clear()
+        return self._texture
+
+    def release(self) -> None:
+        """Give the memory of the graphics back."""
+        self._texture.release()
+
+
 class Textures:
     """The textures of one light field, and the framebuffers of the passes at its size."""
 
@@ -59,13 +99,14 @@ class Textures:
         self.size: Size = (width, height)
         self.corner_views = make_layers(context, self.size, len(CORNERS), 3, stored, np.ascontiguousarray(corners).tobytes())
         self.captured = make_layers(context, self.size, 1, 3, stored)
-        self.exact = make_layers(context, self.size, 1, 3, "f4")  # the newest synthesis
-        self.syntheses = make_layers(context, self.size, 2, 4, "f1")  # the newest one and the one before, in 8 bits
+        self._exact = Handed(make_layers(context, self.size, 1, 3, "f4"))
+        self._syntheses = Handed(make_layers(context, self.size, 2, 4, "f1"))
         self.newest = 0  # layer of `syntheses`
         self.newest_at: Point | None = None  # viewpoint of the newest synthesis
         self.older_at: Point | None = None
-        self.disparity_map = make_texture(context, self.size, 1, "f4")
-        self.disparity_map.filter = _AT_PIXELS
+        disparity_map = make_texture(context, self.size, 1, "f4")
+        disparity_map.filter = _AT_PIXELS
+        self._disparity_map = Handed(disparity_map)
         self.made_at: Point | None = None  # viewpoint of disparity_map
         self.disparity_range = 0.0, 0.0  # the smallest and the greatest of the map
         self.weighed = False  # whether these are of the newest synthesis
@@ -79,12 +120,54 @@ class Textures:
         self.made = 0  # how often a target was made
         self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
 
+    def take_synthesis(
+        self,
+        image: FloatArray,
+        pixels: npt.NDArray[np.uint8],
+        disparity: FloatArray | None,
+        viewpoint: Point,
+        weights: npt.NDArray[np.uint8] | None,
+    ) -> None:
+        """Take the newest synthesis as `Canvas.set_synthesis` does; none of it may be changed afterwards."""
+        self.older_at, self.newest_at = self.newest_at, viewpoint
+        self.newest = 1 - self.newest
+        place = (0, 0, self.newest, *self.size, 1)
+        self._syntheses.take(lambda texture: texture.write(np.ascontiguousarray(pixels), place), self.newest)
+        self._exact.take(lambda texture: texture.write(np.ascontiguousarray(image, np.float32)))
+        if disparity is not None:
+            self._disparity_map.take(lambda texture: texture.write(np.ascontiguousarray(disparity, np.float32)))
+            self.disparity_range = float(disparity.min()), float(disparity.max())
+            self.made_at = viewpoint
+        self.weighed = weights is not None and disparity is not None
+        if weights is not None:
+            self._weights.take(lambda texture: texture.write(np.ascontiguousarray(np.moveaxis(weights, 0, 2))))
+        self.current.clear()
+
+    @property
+    def exact(self) -> moderngl.TextureArray:
+        """The newest synthesis."""
+        return self._exact.texture
+
+    @property
+    def syntheses(self) -> moderngl.TextureArray:
+        """The newest one and the one before, in 8 bits."""
+        return self._syntheses.texture
+
+    @property
+    def disparity_map(self) -> moderngl.Texture:
+        """The newest map, px over the baseline, made at `made_at`."""
+        return self._disparity_map.texture
+
     # What only looking inside needs is made when it is first asked for.
 
     @cached_property
+    def _weights(self) -> Handed[moderngl.Texture]:
+        return Handed(make_texture(self.context, self.size, 4, "f1"))
+
+    @property
     def weights(self) -> moderngl.Texture:
         """The weights of the inputs in the newest synthesis, where `weighed`."""
-        return make_texture(self.context, self.size, 4, "f1")
+        return self._weights.texture
 
     @cached_property
     def inner(self) -> Picture:
@@ -113,7 +196,7 @@ class Textures:
     def release(self) -> None:
         """Give the memory of the graphics back."""
         for value in vars(self).values():
-            if isinstance(value, moderngl.Framebuffer | moderngl.Texture | moderngl.TextureArray | Picture):
+            if isinstance(value, moderngl.Framebuffer | moderngl.Texture | moderngl.TextureArray | Handed | Picture):
                 value.release()
 
 

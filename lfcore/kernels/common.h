@@ -1,6 +1,6 @@
-/* What all compiled parts share. They are parts of a synthesis that torch has no fast operation for, and optional: where they are
- * not compiled, the same is computed in torch (lfcore.planesweep, lfcore.warp and lfcore.compact_parts say what,
- * __init__.py hands it over). For gcc and clang, whose vectors they use.
+/* What all compiled parts share, those of app/painting too. They are parts of a synthesis that torch has no fast operation for,
+ * and optional: where they are not compiled, the same is computed in torch (lfcore.planesweep, lfcore.warp and
+ * lfcore.compact_parts say what, __init__.py hands it over). For gcc and clang, whose vectors they use.
  *
  * Threads are OpenMP's. Torch has been loaded before, so that its OpenMP is found and its threads are used: others would have to
  * wait until those stop spinning.
@@ -101,19 +101,5 @@ PART int32_t whole_below(float place) {
 
 /* An address that Python hands over as a whole number. */
 PART void *at_address(unsigned long long address) { return (void *)(uintptr_t)address; }
-
-/* What the module offers; lfcore/kernels/__init__.py says what each does. */
-PyObject *plane_sweep(PyObject *module, PyObject *arguments); /* sweep.c */
-PyObject *cubic_sample(PyObject *module, PyObject *arguments); /* sample.c */
-PyObject *fourier_forward(PyObject *module, PyObject *arguments); /* fourier.c */
-PyObject *fourier_backward(PyObject *module, PyObject *arguments); /* fourier.c */
-PyObject *winograd_convolution(PyObject *module, PyObject *arguments); /* winograd.c */
-PyObject *halves(PyObject *module, PyObject *arguments); /* halved.c */
-PyObject *amx(PyObject *module, PyObject *arguments); /* amx.c */
-PyObject *amx_products(PyObject *module, PyObject *arguments); /* amx.c */
-PyObject *amx_convolution(PyObject *module, PyObject *arguments); /* amx_convolution.c */
-PyObject *compact_disparity(PyObject *module, PyObject *arguments); /* compact_disparity.c */
-PyObject *compact_warp(PyObject *module, PyObject *arguments); /* compact_warp.c */
-PyObject *compact_blend(PyObject *module, PyObject *arguments); /* compact_blend.c */
 
 #endif

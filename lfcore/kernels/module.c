@@ -1,6 +1,20 @@
 /* The module lfcore._kernels. */
 #include "common.h"
 
+/* What the module offers; lfcore/kernels/__init__.py says what each does. */
+PyObject *plane_sweep(PyObject *module, PyObject *arguments); /* sweep.c */
+PyObject *cubic_sample(PyObject *module, PyObject *arguments); /* sample.c */
+PyObject *fourier_forward(PyObject *module, PyObject *arguments); /* fourier.c */
+PyObject *fourier_backward(PyObject *module, PyObject *arguments); /* fourier.c */
+PyObject *winograd_convolution(PyObject *module, PyObject *arguments); /* winograd.c */
+PyObject *halves(PyObject *module, PyObject *arguments); /* halved.c */
+PyObject *amx(PyObject *module, PyObject *arguments); /* amx.c */
+PyObject *amx_products(PyObject *module, PyObject *arguments); /* amx.c */
+PyObject *amx_convolution(PyObject *module, PyObject *arguments); /* amx_convolution.c */
+PyObject *compact_disparity(PyObject *module, PyObject *arguments); /* compact_disparity.c */
+PyObject *compact_warp(PyObject *module, PyObject *arguments); /* compact_warp.c */
+PyObject *compact_blend(PyObject *module, PyObject *arguments); /* compact_blend.c */
+
 static PyMethodDef methods[] = {
     {"plane_sweep", plane_sweep, METH_VARARGS, NULL},
     {"cubic_sample", cubic_sample, METH_VARARGS, NULL},

@@ -1,0 +1,121 @@
+"""Pictures made by the processor in C, where it does the graphics' work anyway: a third of what the same shaders cost there.
+
+Optional, as lfcore.kernels is: where nothing was compiled, shaders do all of it. Arrays are C-contiguous, pixels uint8
+(H, W, 4), of which the fourth value does not count. No GL here, and no torch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry import Point
+from lfcore.lightfield import FloatArray
+from lfcore.metrics import to_uint8
+
+Pixels = npt.NDArray[np.uint8]
+Map = npt.NDArray[np.float32]
+
+MARGIN = 3  # pixels by which a spread picture is continued; as in carried.c
+_FUNCTIONS = ("carried", "spread", "in_bytes", "mixed", "enlarged")
+
+
+def _compiled() -> ModuleType | None:
+    """The module, but not one that has been compiled from older source and lies in a checkout still."""
+    try:
+        from app.painting import _painting  # type: ignore[attr-defined]
+    except ImportError:
+        return None
+    return _painting if all(hasattr(_painting, name) for name in _FUNCTIONS) else None
+
+
+_PAINTING = _compiled()
+
+
+def compiled() -> bool:
+    """Whether the functions below can be called."""
+    return _PAINTING is not None
+
+
+def in_bytes(image: FloatArray) -> Pixels:
+    """A picture (H, W, 3) of 0 to 1 in 8 bits: (H, W, 4). By numpy where nothing was compiled."""
+    pixels = np.empty((*image.shape[:2], 4), np.uint8)
+    if _PAINTING is not None:
+        _PAINTING.in_bytes(np.ascontiguousarray(image, np.float32), pixels)
+    else:
+        pixels[..., :3] = to_uint8(image)
+        pixels[..., 3] = 255
+    return pixels
+
+
+class Spread:
+    """A picture as `carried` samples it: float32 (H + 2 MARGIN, W + 2 MARGIN, 4), 0 to 255, its edges repeated.
+
+    size: (H, W). Its memory is used again for the pictures it takes one after the other.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.size = height, width = size
+        self.values = np.empty((height + 2 * MARGIN, width + 2 * MARGIN, 4), np.float32)
+
+    def take(self, pixels: Pixels) -> None:
+        """It is this picture from now on."""
+        assert _PAINTING is not None
+        _PAINTING.spread(*self.size, np.ascontiguousarray(pixels), self.values)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A picture, and how far a disparity of 1 px moves what is seen in it, px to the right and down."""
+
+    picture: Spread
+    by: Point
+
+
+def carried(newest: Moved, older: Moved, share: float, disparity: Map, nearest: float, steps: int, out: Pixels) -> None:
+    """What is seen when the newest picture and, for the rest of its `share`, the older one are moved by the newest's disparity.
+
+    disparity: (H, W) float32, px, of the newest picture; nearest: the smallest of it; steps: how often it is looked up again
+    where it led to, see shaders/carry.glsl. out: set.
+    """
+    assert _PAINTING is not None
+    height, width = newest.picture.size
+    layers = (newest.picture.values, newest.by, older.picture.values, older.by)
+    _PAINTING.carried(height, width, *layers, share, disparity, nearest, steps, out)
+
+
+def mixed(before: Pixels, after: Pixels, share: float, out: Pixels) -> None:
+    """The cross-fade between two pictures; share: of `after`. out: set."""
+    assert _PAINTING is not None
+    _PAINTING.mixed(before, after, share, out)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where along an axis a picture is sampled: after which pixels, and how much of the next one counts."""
+
+    first: npt.NDArray[np.int32]
+    share: Map  # 0 to 1
+
+    @staticmethod
+    def between(points: npt.NDArray[np.floating], size: int) -> Places:
+        """For points in pixels, of which the first covers 0 to 1, between the two nearest; beyond an edge that edge."""
+        from_centres = np.clip(points - 0.5, 0, size - 1)
+        first = np.floor(from_centres)
+        return Places(first.astype(np.int32), (from_centres - first).astype(np.float32))
+
+    @staticmethod
+    def at(points: npt.NDArray[np.floating], size: int) -> Places:
+        """The same for the pixels in which they lie."""
+        first = np.clip(np.floor(points), 0, size - 1)
+        return Places(first.astype(np.int32), np.zeros(len(points), np.float32))
+
+
+def enlarged(picture: Pixels, rows: Places, columns: Places, out: Pixels) -> None:
+    """The picture at these places, blue first, as windows are kept. out: (rows, columns, 4), set."""
+    assert _PAINTING is not None
+    height, width = picture.shape[:2]
+    _PAINTING.enlarged(height, width, picture, (rows.first, rows.share), (columns.first, columns.share), out)
