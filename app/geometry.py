@@ -23,6 +23,11 @@ class Rect:
         """Whether the point lies inside."""
         return self.x <= point[0] < self.x + self.width and self.y <= point[1] < self.y + self.height
 
+    def holds(self, other: Rect) -> bool:
+        """Whether all of another rectangle lies inside."""
+        across = self.x <= other.x and other.x + other.width <= self.x + self.width
+        return across and self.y <= other.y and other.y + other.height <= self.y + self.height
+
 
 @dataclass(frozen=True)
 class Placement:

@@ -251,8 +251,9 @@ class Canvas:
         framebuffer.use()
         if around is None:
             framebuffer.clear(*background, 1.0)
-        areas = [(strip, background) for strip in around.surroundings(target.size)] if around is not None else []
-        for area, colour in (*areas, *rectangles):
+        strips = around.surroundings(target.size) if around is not None else []
+        seen = [strip for strip in strips if not any(area.holds(strip) for area, _ in rectangles)]
+        for area, colour in (*((strip, background) for strip in seen), *rectangles):
             left, right = round(area.x), round(area.x + area.width)
             top, bottom = round(area.y), round(area.y + area.height)
             framebuffer.clear(*colour, 1.0, viewport=(left, height - bottom, right - left, bottom - top))
