@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -367,6 +368,7 @@ def _percentiles(disparity: FloatArray | None) -> tuple[float, ...] | None:
     return tuple(np.interp(places, np.arange(len(values)), values).tolist())
 
 
+@lru_cache(maxsize=8)  # it is asked for several times in each frame
 def disparity_range(percentiles: tuple[float, ...], tail: float) -> tuple[float, float]:
     """The disparities below and above which `tail` per cent of the values lie, at least 0.1 px apart."""
     low = float(np.interp(tail, PERCENTILES, percentiles))

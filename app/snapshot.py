@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 from app.geometry import ZOOM_LIMITS
 from app.plain_json import Json, field_types, from_json, to_json
@@ -16,8 +17,14 @@ LOOKED_AT = ("u", "v", "look", "captured", "looking", "focusing", "comparison", 
 
 
 def take(state: ViewState) -> Snapshot:
-    """The fields as JSON."""
-    return {name: to_json(getattr(state, name)) for name in LOOKED_AT}
+    """The fields as JSON, which must not be changed."""
+    return {name: _json_of(getattr(state, name)) for name in LOOKED_AT}
+
+
+@lru_cache(maxsize=64, typed=True)  # True is not 1.0 here
+def _json_of(value: Hashable) -> Json:
+    """As `to_json`; a snapshot is taken in every frame, and most of it is as in the one before."""
+    return to_json(value)
 
 
 def put_back(state: ViewState, snapshot: Snapshot) -> None:
