@@ -145,15 +145,28 @@ class Controller:
 
     def tick(self, now: float) -> None:
         """Take what the workers have finished, and ask them for what is wanted next. `now` in seconds."""
+        self._take_over(now)
+        self._collect()
+        self.exports.follow_dialog(self.state.export)
+        for fault in self.exports.faults():
+            self.say(fault)
+        self._go_on(now)
+
+    def follow(self, now: float) -> None:
+        """Follow what has been done to the state since this frame's tick, but take nothing from the workers: what comes
+        during a frame would have its picture made twice."""
+        self._take_over(now)
+        self._go_on(now)
+
+    def _take_over(self, now: float) -> None:
+        """What the person has done, and chosen."""
         self._now = now
         if self._acted:
             self._acted, self._acted_at = False, now
         if self.state.model not in ("", self._model):
             self._change_model(self.state.model)
-        self._collect()
-        self.exports.follow_dialog(self.state.export)
-        for fault in self.exports.faults():
-            self.say(fault)
+
+    def _go_on(self, now: float) -> None:
         if self.light_field is None:
             return
         self._play(now)

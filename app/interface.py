@@ -151,7 +151,7 @@ class Interface:
         # What the panels changed is drawn in this very frame.
         for request in requests:
             self._fulfil(request)
-        self.controller.tick(now)
+        self.controller.follow(now)
         self.surroundings.tick(now, imgui.is_any_mouse_down() or state.swaying)
         self._synchronise()
         self._synchronise_exhibit()

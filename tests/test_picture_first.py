@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from moving_scene import TruthSynthesizer, light_field
+from virtual_screen import wait_until
 
 from app.canvas import Canvas, Frame
 from app.geometry import Point
@@ -76,3 +77,24 @@ def test_what_the_panels_change_is_shown_in_the_same_frame(viewer: Offscreen, mo
     recorder = Recorder(monkeypatch, MOVED)
     viewer.draw()
     assert recorder.order == [("made", FIRST), ("panels", FIRST), ("made", MOVED), ("shown", MOVED)]
+
+
+def test_a_synthesis_that_comes_during_the_frame_is_for_the_next_one(
+    viewer: Offscreen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller = viewer.interface.controller
+    before = controller.newest
+    recorder = Recorder(monkeypatch, None)
+    pad = viewpoint_pad.draw
+
+    def waiting_pad(*arguments: Any) -> None:
+        pad(*arguments)
+        wait_until(lambda: not controller._asking.busy, "the synthesis")
+
+    monkeypatch.setattr(viewpoint_pad, "draw", waiting_pad)
+    controller.state.move_to(*MOVED)
+    viewer.draw()
+    assert recorder.order == [("made", MOVED), ("panels", MOVED), ("shown", MOVED)]
+    assert controller.newest is before
+    viewer.draw()
+    assert controller.newest is not before
