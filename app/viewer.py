@@ -12,7 +12,7 @@ from pathlib import Path
 
 # imgui-bundle brings its own glfw library and tells the glfw package to use that one: it must be imported first, or two
 # copies of glfw would not know of each other's windows.
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 import glfw  # isort: skip
 
@@ -48,6 +48,7 @@ _WOKEN_FRAMES = 2
 _HOVER_SECONDS = 0.8  # after the last movement of the mouse, a tooltip may still appear
 _HOVER_INTERVAL = 0.1
 _CARET_INTERVAL = 0.25  # of a blinking caret
+_LEAST_STEP = 1e-5  # seconds from one frame to the next, since imgui takes none of 0
 _IDLE_INTERVAL = 0.5  # how long Ctrl-C may have to wait, since Python's signals wait for glfw to return
 
 
@@ -185,6 +186,8 @@ class _Window:
         self._target = self._context.detect_framebuffer(0)
         self._pace = Pace(_frame_interval(), core_count())
         self._drawn_at = -math.inf  # when the last frame was begun
+        self._frame_at = time.monotonic()  # by imgui's time
+        self._cursor: int | None = None  # shape of the mouse that has been set
         self._interface: Interface | None = None
         self._touched_at = 0.0  # last event of mouse or keyboard
         self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
@@ -275,10 +278,24 @@ class _Window:
             return  # minimised
         interface = self._at_hand
         interface.set_scale(self._scale)
-        imgui.backends.glfw_new_frame()
+        self._new_frame()
         interface.draw(Target(self._target, size), time.monotonic())
         glfw.swap_buffers(self._window)
         self._name_window(interface.controller)
+
+    def _new_frame(self) -> None:
+        """Tell imgui size and time, as its backend for glfw does, but without asking the X server three times a frame. What the
+        mouse does comes by callbacks; only another shape of it has to be set by the backend."""
+        cursor, now = imgui.get_mouse_cursor(), time.monotonic()
+        if cursor != self._cursor:
+            imgui.backends.glfw_new_frame()
+            self._cursor = cursor
+        io = imgui.get_io()
+        (width, height), (pixels_across, pixels_down) = self._units, self._size
+        io.display_size = ImVec2(width, height)
+        io.display_framebuffer_scale = ImVec2(pixels_across / max(width, 1), pixels_down / max(height, 1))
+        io.delta_time = max(now - self._frame_at, _LEAST_STEP)
+        self._frame_at = now
 
     def hide(self) -> None:
         """Take the window off the screen."""
@@ -324,8 +341,8 @@ class _Window:
         self._size = glfw.get_framebuffer_size(self._window)
         # Content scale in imgui's units, which on some systems are scaled already.
         content = max(glfw.get_window_content_scale(self._window))
-        width = max(glfw.get_window_size(self._window)[0], 1)
-        self._scale = content * width / max(self._size[0], 1) or 1.0
+        self._units = glfw.get_window_size(self._window)
+        self._scale = content * max(self._units[0], 1) / max(self._size[0], 1) or 1.0
 
     def _name_window(self, controller: Controller) -> None:
         title = f"{controller.name} \N{EN DASH} {TITLE}" if controller.name else TITLE
