@@ -67,10 +67,9 @@ class Interface:
         if self.in_software:
             spread_rasteriser()
         reach = CARRIED_IN_SOFTWARE if self.in_software else CARRIED
-        self._paints = self.in_software and painting.compiled()
-        self._canvas = Canvas(
-            context, reach=reach, paints=self._paints, copy=WindowCopy(load) if self._paints and load is not None else None
-        )
+        paints = self.in_software and painting.compiled()
+        copy = WindowCopy(load) if paints and load is not None else None
+        self._canvas = Canvas(context, reach=reach, paints=paints, copy=copy)
         self._atlas = Atlas(context)
         self._fonts = theme.apply(scale)
         self._theme = Theme.DARK

@@ -317,11 +317,13 @@ def test_a_picture_made_much_smaller_keeps_its_mean(canvas: Canvas, gl: Any) -> 
     texture.release()
 
 
-@pytest.mark.parametrize("reach", [CARRIED, CARRIED_IN_SOFTWARE])
+@pytest.mark.parametrize(("reach", "paints"), [(CARRIED, False), (CARRIED_IN_SOFTWARE, False), (CARRIED_IN_SOFTWARE, True)])
 def test_warming_up_runs_what_a_moving_picture_needs_and_leaves_nothing(
-    gl: Any, reach: Reach, monkeypatch: pytest.MonkeyPatch
+    gl: Any, reach: Reach, paints: bool, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     """Once compiled by OpenGL a shader is compiled by a software rasteriser still, when it is first run."""
+    if paints:
+        request.getfixturevalue("compiled_painting")
     run: set[Pass] = set()
     render = Pass.render
 
@@ -330,7 +332,7 @@ def test_warming_up_runs_what_a_moving_picture_needs_and_leaves_nothing(
         render(self, *arguments)
 
     monkeypatch.setattr(Pass, "render", noted)
-    canvas = Canvas(gl, reach=reach)
+    canvas = Canvas(gl, reach=reach, paints=paints)
     canvas.warm_up(Target(gl.simple_framebuffer((8, 8)), (8, 8)))
     assert not canvas.has_light_field
     warm = frozenset(run)

@@ -12,11 +12,12 @@ import pytest
 from app import painting
 from app.canvas import BACKGROUND, Canvas, Frame, Target, WindowCopy, standalone_functions
 from app.geometry import Placement, Rect
-from app.painting import Moved, Pixels, Places, Spread, in_bytes
+from app.painting import Moved, Places, Spread, in_bytes
 from app.state import CARRIED_IN_SOFTWARE, Look
 from app.tone import Curve, Tone
 from lfcore.lightfield import FloatArray
 from lfcore.metrics import to_uint8
+from lfcore.synthesis import ByteArray
 
 SIZE = (67, 141)  # neither is a whole number of strips
 WINDOW = (300, 200)
@@ -29,7 +30,7 @@ def compiled(compiled_painting: None) -> None:
     """All of these need it."""
 
 
-def some_pixels(seed: int = 0) -> Pixels:
+def some_pixels(seed: int = 0) -> ByteArray:
     return np.random.default_rng(seed).integers(0, 256, (*SIZE, 4), dtype=np.uint8)
 
 
@@ -47,7 +48,7 @@ def two_planes() -> npt.NDArray[np.float32]:
     return np.where((abs(x - 70) < 20) & (abs(y - 30) < 15), -6.0, ground).astype(np.float32)
 
 
-def carried(by: tuple[float, float], disparity: npt.NDArray[np.float32], steps: int, pixels: Pixels) -> Pixels:
+def carried(by: tuple[float, float], disparity: npt.NDArray[np.float32], steps: int, pixels: ByteArray) -> ByteArray:
     out = np.empty_like(pixels)
     spread = Spread(SIZE)
     spread.take(pixels)
@@ -144,7 +145,9 @@ def test_buffers_of_other_sizes_and_places_beyond_the_picture_are_refused() -> N
 @pytest.fixture
 def canvases(gl: Any) -> Iterator[tuple[Canvas, Canvas]]:
     """One whose pictures the processor paints and copies, one whose pictures shaders make, with the same light field."""
-    copy = WindowCopy(standalone_functions())
+    load = standalone_functions()
+    assert load is not None
+    copy = WindowCopy(load)
     made = (Canvas(gl, reach=CARRIED_IN_SOFTWARE, paints=True, copy=copy), Canvas(gl, reach=CARRIED_IN_SOFTWARE))
     for canvas in made:
         canvas.set_light_field(np.stack([in_bytes(some_image(seed))[..., :3] for seed in range(4)]))

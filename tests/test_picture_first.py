@@ -89,7 +89,7 @@ def test_a_synthesis_that_comes_during_the_frame_is_for_the_next_one(
 
     def waiting_pad(*arguments: Any) -> None:
         pad(*arguments)
-        wait_until(lambda: not controller._asking.busy, "the synthesis")
+        wait_until(lambda: not controller._asking._worker.outcomes.empty(), "the synthesis")
 
     monkeypatch.setattr(viewpoint_pad, "draw", waiting_pad)
     controller.state.move_to(*MOVED)

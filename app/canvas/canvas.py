@@ -1,10 +1,10 @@
 """The picture in the window.
 
 Every way of looking is a shader over the same textures: the four corner views, the newest synthesis with its disparity
-map, the synthesis before it, and the captured view. What is shown is made at the
-light field's own size in 8 bits, as the screen has, and only when it has changed; the window then magnifies it. Only where
-there is no GPU, and the processor does the graphics' work anyway, does it make the most common pictures by code of its own
-(app.painting), which is faster than shaders are there.
+map, the synthesis before it, and the captured view. What is shown is made at the light field's own size in 8 bits, as the
+screen has, and only when it has changed; the window then magnifies it. Only where there is no GPU, and the processor does the
+graphics' work anyway, does it make the most common pictures by code of its own (app.painting), which is faster than shaders
+are there.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class Canvas:
         The one before is kept for the cross-fade. Both are carried in 8 bits, which costs a software rasteriser half the time.
         None of it may be changed afterwards: it is handed to the graphics when they need it.
         """
-        self._at_hand.synthesized.take(image, pixels, disparity, viewpoint, weights)
+        self._at_hand.textures.take_synthesis(image, pixels, disparity, viewpoint, weights)
 
     def set_captured(self, view: npt.NDArray[np.generic]) -> None:
         """Take the captured view (H, W, 3), as stored, to be compared with or looked at."""
@@ -271,21 +271,27 @@ class Canvas:
 
         To copy it has to wait for everything that has been drawn, be it only the clearing.
         """
-        made = self._made(frame)
-        copies = isinstance(made, Painted) and self._copy is not None and frame.dim == 1.0 and self._copy.suits(placement)
+        copies = isinstance(self._made(frame), Painted) and self._copy_for(frame, placement) is not None
         return visible(self._at_hand.textures.size, area, placement) if copies else None
 
     def draw(self, frame: Frame, target: Target, area: Rect, placement: Placement) -> None:
         """Draw the frame's picture into the target, inside the area (in its pixels, y downwards), at the placement."""
         made, colours = self._made(frame), _colours(frame)
-        if isinstance(made, Painted) and self._copy is not None and self.copied(frame, area, placement) is not None:
-            self._copy.image(made.pixels, target, area, placement)
-            return
-        texture = made.texture if isinstance(made, Painted) else made
+        if isinstance(made, Painted):
+            copy = self._copy_for(frame, placement)
+            if copy is not None:
+                copy.image(made.pixels, target, area, placement)
+                return
+            made = made.texture
         if colours is not None:
-            self._magnifier.map(texture, colours, target, area, placement)
+            self._magnifier.map(made, colours, target, area, placement)
         else:
-            self._magnifier.image(texture, frame.dim, target, area, placement)
+            self._magnifier.image(made, frame.dim, target, area, placement)
+
+    def _copy_for(self, frame: Frame, placement: Placement) -> WindowCopy | None:
+        """What copies the frame's picture, if it has been painted; None where it has to be drawn."""
+        copy = self._copy
+        return copy if copy is not None and frame.dim == 1.0 and copy.suits(placement) else None
 
     def draw_slices(
         self, slicing: Slicing, tone: Tone, target: Target, strips: Strips, area: Rect, placement: Placement

@@ -36,8 +36,11 @@ def standalone_context() -> moderngl.Context:
         ) from error
 
 
-def standalone_functions() -> Callable[[str], int]:
-    """The addresses of OpenGL's functions by name, for the contexts of `standalone_context`, of which there must be one."""
-    address_of = ctypes.CDLL("libEGL.so.1").eglGetProcAddress
+def standalone_functions() -> Callable[[str], int] | None:
+    """The addresses of OpenGL's functions by name, for contexts of `standalone_context`; None where EGL has another name."""
+    try:
+        address_of = ctypes.CDLL("libEGL.so.1").eglGetProcAddress
+    except OSError:
+        return None
     address_of.argtypes, address_of.restype = (ctypes.c_char_p,), ctypes.c_void_p
     return lambda name: address_of(name.encode()) or 0

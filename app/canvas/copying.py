@@ -17,7 +17,8 @@ import numpy.typing as npt
 from app.canvas.frame import Target
 from app.canvas.placing import sampling, visible
 from app.geometry import Placement, Rect, Size
-from app.painting import Pixels, Places, enlarged
+from app.painting import Places, enlarged
+from lfcore.synthesis import ByteArray
 
 _TEXTURE_2D, _READ_FRAMEBUFFER, _DRAW_FRAMEBUFFER, _COLOR_ATTACHMENT = 0x0DE1, 0x8CA8, 0x8CA9, 0x8CE0
 _RGBA, _BGRA, _UNSIGNED_BYTE = 0x1908, 0x80E1, 0x1401
@@ -54,7 +55,7 @@ class WindowCopy:
     def __init__(self, load: Callable[[str], int]) -> None:
         self._gl = {name: ctypes.CFUNCTYPE(None, *types)(load(name)) for name, types in _FUNCTIONS.items()}
         self._size: Size = (0, 0)  # that there is room for
-        self._room: Pixels = np.empty(0, np.uint8)
+        self._room: ByteArray = np.empty(0, np.uint8)
         self._texture, self._framebuffer = _UNSIGNED(), _UNSIGNED()
 
     @staticmethod
@@ -62,7 +63,7 @@ class WindowCopy:
         """Whether pictures can be put there: those made much smaller are not."""
         return sampling(placement.scale) in _SAMPLED
 
-    def image(self, picture: Pixels, target: Target, area: Rect, placement: Placement) -> None:
+    def image(self, picture: ByteArray, target: Target, area: Rect, placement: Placement) -> None:
         """A picture (H, W, 4) into its place in the window, as Magnifier.image draws it."""
         height, width = picture.shape[:2]
         inside = visible((width, height), area, placement)
@@ -77,7 +78,7 @@ class WindowCopy:
         self._hand_over(seen)
         self._copy(target, (inside.x, inside.y), (inside.width, inside.height))
 
-    def _hand_over(self, pixels: Pixels) -> None:
+    def _hand_over(self, pixels: ByteArray) -> None:
         height, width = pixels.shape[:2]
         self._gl["glBindTexture"](_TEXTURE_2D, self._texture)
         self._gl["glPixelStorei"](_UNPACK_ALIGNMENT, 4)

@@ -13,31 +13,31 @@ from app.canvas.passes import Passes
 from app.canvas.synthesized import Synthesized
 from app.canvas.textures import Made, Textures, make_texture
 from app.geometry import Point
-from app.painting import Map, Moved, Pixels, Spread
+from app.painting import Moved, Spread
 from app.state import Reach
 from app.tone import Tone
-from lfcore.lightfield import FloatArray
+from lfcore.synthesis import ByteArray
 
 
-class Painted:
+class Painted(Made):
     """A picture (H, W, 4) in the processor's memory, and what it was last made for; a texture, too, once that is asked for."""
 
     def __init__(self, textures: Textures) -> None:
-        self._textures = textures
-        self._pixels: Pixels | None = None
+        super().__init__(textures)
+        self._pixels: ByteArray | None = None
         self._handed = False  # the texture is of these pixels
 
     @property
-    def pixels(self) -> Pixels:
+    def pixels(self) -> ByteArray:
         """What it is."""
         assert self._pixels is not None
         return self._pixels
 
-    def take(self, pixels: Pixels) -> None:
+    def take(self, pixels: ByteArray) -> None:
         """It is this from now on."""
         self._pixels, self._handed = pixels, False
 
-    def begin(self) -> Pixels:
+    def begin(self) -> ByteArray:
         """Memory of its own, which it becomes as that is filled."""
         self.take(self._room)
         return self._room
@@ -50,28 +50,19 @@ class Painted:
             self._handed = True
         return self._texture
 
-    def outdated(self, *made_for: object) -> bool:
-        """As Picture.outdated."""
-        return self._textures.outdated(self, *made_for)
-
-    @property
-    def made_for(self) -> tuple[object, ...]:
-        """What it was last made for."""
-        return self._textures.current.get(self, ())
-
     def release(self) -> None:
         """Give the memory of the graphics back."""
         if "_texture" in vars(self):
             self._texture.release()
 
     @cached_property
-    def _room(self) -> Pixels:
-        width, height = self._textures.size
+    def _room(self) -> ByteArray:
+        width, height = self._owner.size
         return np.empty((height, width, 4), np.uint8)
 
     @cached_property
     def _texture(self) -> moderngl.Texture:
-        return make_texture(self._textures.context, self._textures.size, 4, "f1")
+        return make_texture(self._owner.context, self._owner.size, 4, "f1")
 
 
 class PaintedSynthesized(Synthesized):
@@ -82,24 +73,11 @@ class PaintedSynthesized(Synthesized):
 
     def __init__(self, passes: Passes, textures: Textures, reach: Reach) -> None:
         super().__init__(passes, textures, reach)
-        self._syntheses: list[Pixels | None] = [None, None]  # as in Textures.syntheses
         width, height = textures.size
-        self._spread = Spread((height, width)), Spread((height, width))  # the same, once they are carried
-        self._is_spread = [False, False]
-        self._map: Map | None = None
+        self._spread = Spread((height, width)), Spread((height, width))  # by layer of Textures.syntheses
         self._copies = Painted(textures), Painted(textures)  # of the one before and the newest
         self._moved = Painted(textures)
         self._faded = Painted(textures)
-
-    def take(
-        self, image: FloatArray, pixels: Pixels, disparity: FloatArray | None, viewpoint: Point, weights: Pixels | None
-    ) -> None:
-        """See Synthesized."""
-        super().take(image, pixels, disparity, viewpoint, weights)
-        layer = self._textures.newest
-        self._syntheses[layer], self._is_spread[layer] = np.ascontiguousarray(pixels), False
-        if disparity is not None:
-            self._map = np.ascontiguousarray(disparity, np.float32)
 
     def release(self) -> None:
         """See Synthesized."""
@@ -113,7 +91,7 @@ class PaintedSynthesized(Synthesized):
         return self._copied(0, 1 - self._textures.newest) if tone == Tone() else super()._older(tone)
 
     def _copied(self, copy: int, layer: int) -> Painted:
-        result, pixels = self._copies[copy], self._syntheses[layer]
+        result, pixels = self._copies[copy], self._textures.pixels[layer]
         assert pixels is not None
         if result.outdated("copy of", layer):
             result.take(pixels)
@@ -125,19 +103,18 @@ class PaintedSynthesized(Synthesized):
         textures, result = self._textures, self._moved
         if not result.outdated("carried", viewpoint, older, share):
             return result
-        assert textures.made_at is not None and self._map is not None
+        assert textures.made_at is not None and textures.disparities is not None
         newest = self._moved_to(viewpoint, textures.newest, textures.made_at)
         before = self._moved_to(viewpoint, 1 - textures.newest, older) if older is not None else newest
         steps, nearest = steps_to(textures, viewpoint), textures.disparity_range[0]
-        painting.carried(newest, before, share if older is not None else 1.0, self._map, nearest, steps, result.begin())
+        share = share if older is not None else 1.0
+        painting.carried(newest, before, share, textures.disparities, nearest, steps, result.begin())
         return result
 
     def _moved_to(self, viewpoint: Point, layer: int, made_at: Point) -> Moved:
-        pixels, spread = self._syntheses[layer], self._spread[layer]
-        if not self._is_spread[layer]:
-            assert pixels is not None
-            spread.take(pixels)
-            self._is_spread[layer] = True
+        pixels, spread = self._textures.pixels[layer], self._spread[layer]
+        assert pixels is not None
+        spread.take(pixels)
         return Moved(spread, (made_at[0] - viewpoint[0], made_at[1] - viewpoint[1]))
 
     def _mixed(self, before: Made, after: Made, share: float) -> Made:

@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 
 import moderngl
-import numpy as np
-import numpy.typing as npt
 
 from app.canvas.carrying import carrying
 from app.canvas.passes import AnyTexture, Passes, Uniform
@@ -15,7 +13,6 @@ from app.canvas.textures import Made, Picture, Textures
 from app.geometry import Point
 from app.state import Reach, carried_share
 from app.tone import Tone
-from lfcore.lightfield import FloatArray
 
 
 class Synthesized:
@@ -26,17 +23,6 @@ class Synthesized:
         self._passes = passes
         self._textures = textures
         self._reach = reach
-
-    def take(
-        self,
-        image: FloatArray,
-        pixels: npt.NDArray[np.uint8],
-        disparity: FloatArray | None,
-        viewpoint: Point,
-        weights: npt.NDArray[np.uint8] | None,
-    ) -> None:
-        """Take the newest synthesis as `Canvas.set_synthesis` does."""
-        self._textures.take_synthesis(image, pixels, disparity, viewpoint, weights)
 
     def release(self) -> None:
         """Give memory of the graphics beside that of the textures back."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import moderngl
 import numpy as np
@@ -12,31 +13,41 @@ import numpy.typing as npt
 
 from app.geometry import Point, Size
 from lfcore.lightfield import CORNERS, FloatArray
+from lfcore.synthesis import ByteArray
 
 _AnyTexture = TypeVar("_AnyTexture", moderngl.Texture, moderngl.TextureArray)
 
 TEXTURE_TYPES = {"uint8": "f1", "uint16": "nu2", "float32": "f4"}  # numpy type to moderngl's normalised texture type
 
 
-class Made(Protocol):
-    """A picture at the light field's own size that has been made."""
+class Made(ABC):
+    """A picture at the light field's own size, and what it was last made for."""
+
+    def __init__(self, owner: Textures) -> None:
+        self._owner = owner
 
     @property
+    @abstractmethod
     def texture(self) -> moderngl.Texture:
         """What the graphics sample."""
+
+    def outdated(self, *made_for: object) -> bool:
+        """Whether the picture was last made for something else; it counts as made for this from now on."""
+        return self._owner.outdated(self, *made_for)
 
     @property
     def made_for(self) -> tuple[object, ...]:
         """What it was last made for."""
+        return self._owner.current.get(self, ())
 
 
-class Picture:
+class Picture(Made):
     """A texture that a pass draws into, and what it was last drawn for. Its memory is taken when it is first used: most looks
     need few of them, and taking all at once would hold up the frame in which a light field appears."""
 
     def __init__(self, context: moderngl.Context, size: Size, dtype: str, owner: Textures, components: int = 4) -> None:
+        super().__init__(owner)
         self._context, self._size, self._dtype, self._components = context, size, dtype, components
-        self._owner = owner
 
     @cached_property
     def texture(self) -> moderngl.Texture:
@@ -47,15 +58,6 @@ class Picture:
     def target(self) -> moderngl.Framebuffer:
         """What is drawn into."""
         return self._context.framebuffer([self.texture])
-
-    def outdated(self, *made_for: object) -> bool:
-        """Whether the picture was last made for something else; it counts as made for this from now on."""
-        return self._owner.outdated(self, *made_for)
-
-    @property
-    def made_for(self) -> tuple[object, ...]:
-        """What it was last made for."""
-        return self._owner.current.get(self, ())
 
     def release(self) -> None:
         """Give the memory of the graphics back."""
@@ -101,12 +103,14 @@ class Textures:
         self.captured = make_layers(context, self.size, 1, 3, stored)
         self._exact = Handed(make_layers(context, self.size, 1, 3, "f4"))
         self._syntheses = Handed(make_layers(context, self.size, 2, 4, "f1"))
+        self.pixels: list[ByteArray | None] = [None, None]  # by layer of `syntheses`
         self.newest = 0  # layer of `syntheses`
         self.newest_at: Point | None = None  # viewpoint of the newest synthesis
         self.older_at: Point | None = None
         disparity_map = make_texture(context, self.size, 1, "f4")
         disparity_map.filter = _AT_PIXELS
         self._disparity_map = Handed(disparity_map)
+        self.disparities: FloatArray | None = None  # of disparity_map
         self.made_at: Point | None = None  # viewpoint of disparity_map
         self.disparity_range = 0.0, 0.0  # the smallest and the greatest of the map
         self.weighed = False  # whether these are of the newest synthesis
@@ -123,20 +127,22 @@ class Textures:
     def take_synthesis(
         self,
         image: FloatArray,
-        pixels: npt.NDArray[np.uint8],
+        pixels: ByteArray,
         disparity: FloatArray | None,
         viewpoint: Point,
-        weights: npt.NDArray[np.uint8] | None,
+        weights: ByteArray | None,
     ) -> None:
         """Take the newest synthesis as `Canvas.set_synthesis` does; none of it may be changed afterwards."""
         self.older_at, self.newest_at = self.newest_at, viewpoint
         self.newest = 1 - self.newest
         place = (0, 0, self.newest, *self.size, 1)
-        self._syntheses.take(lambda texture: texture.write(np.ascontiguousarray(pixels), place), self.newest)
+        self.pixels[self.newest] = pixels = np.ascontiguousarray(pixels)
+        self._syntheses.take(lambda texture: texture.write(pixels, place), self.newest)
         self._exact.take(lambda texture: texture.write(np.ascontiguousarray(image, np.float32)))
         if disparity is not None:
-            self._disparity_map.take(lambda texture: texture.write(np.ascontiguousarray(disparity, np.float32)))
-            self.disparity_range = float(disparity.min()), float(disparity.max())
+            self.disparities = values = np.ascontiguousarray(disparity, np.float32)
+            self._disparity_map.take(lambda texture: texture.write(values))
+            self.disparity_range = float(values.min()), float(values.max())
             self.made_at = viewpoint
         self.weighed = weights is not None and disparity is not None
         if weights is not None:

@@ -1,38 +1,26 @@
 """Pictures made by the processor in C, where it does the graphics' work anyway: a third of what the same shaders cost there.
 
 Optional, as lfcore.kernels is: where nothing was compiled, shaders do all of it. Arrays are C-contiguous, pixels uint8
-(H, W, 4), of which the fourth value does not count. No GL here, and no torch.
+(H, W, 4), of which the fourth value does not count. With a GPU only `in_bytes` is used. No GL here, and no torch.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
 
 from app.geometry import Point
+from lfcore.extensions import extension
 from lfcore.lightfield import FloatArray
 from lfcore.metrics import to_uint8
-
-Pixels = npt.NDArray[np.uint8]
-Map = npt.NDArray[np.float32]
+from lfcore.synthesis import ByteArray
 
 MARGIN = 3  # pixels by which a spread picture is continued; as in carried.c
 _FUNCTIONS = ("carried", "spread", "in_bytes", "mixed", "enlarged")
 
-
-def _compiled() -> ModuleType | None:
-    """The module, but not one that has been compiled from older source and lies in a checkout still."""
-    try:
-        from app.painting import _painting  # type: ignore[attr-defined]
-    except ImportError:
-        return None
-    return _painting if all(hasattr(_painting, name) for name in _FUNCTIONS) else None
-
-
-_PAINTING = _compiled()
+_PAINTING = extension("app.painting._painting", _FUNCTIONS)
 
 
 def compiled() -> bool:
@@ -40,7 +28,7 @@ def compiled() -> bool:
     return _PAINTING is not None
 
 
-def in_bytes(image: FloatArray) -> Pixels:
+def in_bytes(image: FloatArray) -> ByteArray:
     """A picture (H, W, 3) of 0 to 1 in 8 bits: (H, W, 4). By numpy where nothing was compiled."""
     pixels = np.empty((*image.shape[:2], 4), np.uint8)
     if _PAINTING is not None:
@@ -60,11 +48,14 @@ class Spread:
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = height, width = size
         self.values = np.empty((height + 2 * MARGIN, width + 2 * MARGIN, 4), np.float32)
+        self._taken: ByteArray | None = None
 
-    def take(self, pixels: Pixels) -> None:
-        """It is this picture from now on."""
+    def take(self, pixels: ByteArray) -> None:
+        """It is this picture from now on, which may not be changed; nothing is done where it is that already."""
         assert _PAINTING is not None
-        _PAINTING.spread(*self.size, np.ascontiguousarray(pixels), self.values)
+        if pixels is not self._taken:
+            _PAINTING.spread(*self.size, np.ascontiguousarray(pixels), self.values)
+            self._taken = pixels
 
 
 @dataclass(frozen=True)
@@ -75,7 +66,9 @@ class Moved:
     by: Point
 
 
-def carried(newest: Moved, older: Moved, share: float, disparity: Map, nearest: float, steps: int, out: Pixels) -> None:
+def carried(
+    newest: Moved, older: Moved, share: float, disparity: FloatArray, nearest: float, steps: int, out: ByteArray
+) -> None:
     """What is seen when the newest picture and, for the rest of its `share`, the older one are moved by the newest's disparity.
 
     disparity: (H, W) float32, px, of the newest picture; nearest: the smallest of it; steps: how often it is looked up again
@@ -87,7 +80,7 @@ def carried(newest: Moved, older: Moved, share: float, disparity: Map, nearest: 
     _PAINTING.carried(height, width, *layers, share, disparity, nearest, steps, out)
 
 
-def mixed(before: Pixels, after: Pixels, share: float, out: Pixels) -> None:
+def mixed(before: ByteArray, after: ByteArray, share: float, out: ByteArray) -> None:
     """The cross-fade between two pictures; share: of `after`. out: set."""
     assert _PAINTING is not None
     _PAINTING.mixed(before, after, share, out)
@@ -98,7 +91,7 @@ class Places:
     """Where along an axis a picture is sampled: after which pixels, and how much of the next one counts."""
 
     first: npt.NDArray[np.int32]
-    share: Map  # 0 to 1
+    share: FloatArray  # 0 to 1
 
     @staticmethod
     def between(points: npt.NDArray[np.floating], size: int) -> Places:
@@ -114,7 +107,7 @@ class Places:
         return Places(first.astype(np.int32), np.zeros(len(points), np.float32))
 
 
-def enlarged(picture: Pixels, rows: Places, columns: Places, out: Pixels) -> None:
+def enlarged(picture: ByteArray, rows: Places, columns: Places, out: ByteArray) -> None:
     """The picture at these places, blue first, as windows are kept. out: (rows, columns, 4), set."""
     assert _PAINTING is not None
     height, width = picture.shape[:2]

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from types import ModuleType
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
+
+from lfcore.extensions import extension
 
 _FUNCTIONS = (
     "plane_sweep",
@@ -41,17 +42,7 @@ AMX_MOST_VALUES = 64 * AMX_PIECE  # of rows that lie behind one another
 _AMX_ROWS = 16
 _NEVER = -1e30  # a score that is never chosen
 
-
-def _compiled() -> ModuleType | None:
-    """The module, but not one that has been compiled from older source and lies in a checkout still."""
-    try:
-        from lfcore import _kernels  # type: ignore[attr-defined]
-    except ImportError:
-        return None
-    return _kernels if all(hasattr(_kernels, name) for name in _FUNCTIONS) else None
-
-
-_KERNELS = _compiled()
+_KERNELS = extension("lfcore._kernels", _FUNCTIONS)
 
 
 def compiled() -> bool:
