@@ -70,6 +70,20 @@ def test_a_plane_at_a_known_disparity_moves_by_whole_pixels(way: tuple[int, int]
     np.testing.assert_array_equal(out[..., :3], pixels[rows][:, columns, :3])
 
 
+@pytest.mark.parametrize("way", [(-500, -500), (-1, -1), (1, 1), (500, 500)])
+def test_nothing_beside_a_spread_picture_counts(way: tuple[int, int]) -> None:
+    """It lies among what is not a number, of which even a weight of 0 would be seen."""
+    pixels, spread = some_pixels(), Spread(SIZE)
+    beside = spread.values.shape[1] * 4 * 4
+    memory = np.full(spread.values.size + 2 * beside, np.nan, np.float32)
+    spread.values = memory[beside:-beside].reshape(spread.values.shape)
+    spread.take(pixels)
+    out = np.empty_like(pixels)
+    painting.carried(Moved(spread, way), Moved(spread, way), 1.0, np.ones(SIZE, np.float32), 1.0, 0, out)
+    rows, columns = (np.clip(np.arange(size) + by, 0, size - 1) for size, by in zip(SIZE, way[::-1], strict=True))
+    np.testing.assert_array_equal(out[..., :3], pixels[rows][:, columns, :3])
+
+
 @pytest.mark.parametrize(("disparity", "column"), [(1e30, -1), (-1e30, 0)])
 def test_what_moves_far_beyond_the_picture_is_its_edge(disparity: float, column: int) -> None:
     pixels = some_pixels()

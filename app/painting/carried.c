@@ -63,10 +63,11 @@ PART void carry(const Carrying *c, Strip s, float from_here[STRIP]) {
     }
 }
 
-/* Of each place along an axis the first of four samples and their weights (cubic, a = -0.5). `size`: of the picture. */
+/* Of each place along an axis the first of four samples and their weights (cubic, a = -0.5). `size`: of the picture. From one
+ * pixel beyond either edge on all four are that edge, and the last of them is the last that a spread picture has. */
 PART void place(float first, float each, float moved_by, const float *restrict disparity, Py_ssize_t size, int32_t *restrict whole,
                 float (*restrict taps)[STRIP]) {
-    const float farthest = (float)(size + 1);
+    const float farthest = (float)size;
     for (int i = 0; i < STRIP; ++i) {
         const float at = bounded(first + each * (float)i + moved_by * disparity[i], -2.0f, farthest) + 2.0f;
         const int32_t below = (int32_t)at;
