@@ -1,12 +1,11 @@
-"""Convolution with 3 x 3 kernels by Winograd's transforms: a quarter of the multiplications, in float32 a fifth.
+"""Convolution with 3 x 3 kernels by Winograd's transforms: a quarter of the multiplications.
 
 F(4 x 4, 3 x 3) of Lavin and Gray (CVPR 2016): the picture is cut into tiles of 6 x 6 px, which overlap; between a transform and
 its inverse, a convolution is a product of matrices at each of 36 places, (tiles, channels in) by (channels in,
 channels out), and gives 4 x 4 px: 36 multiplications a tile and pair of channels in place of 144. Compiled (lfcore.kernels).
 
-The polynomials of the transforms are taken at 0, at infinity, and at some points with both signs. With the square roots of 1/2
-and 2 numbers lose fewer digits than with 1 and 2 in their place, so that what lies between the transforms may be bfloat16. In
-float32 there are digits enough for F(6 x 6, 3 x 3): tiles of 8 x 8 px and 64 multiplications in place of 324.
+The polynomials of the transforms are taken at 0, at infinity, and at the square roots of 1/2 and 2, with both signs: numbers
+lose fewer digits than with 1 and 2 in their place, so that what lies between the transforms may be bfloat16.
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ from torch import Tensor
 
 from lfcore.kernels import COLUMNS, WINOGRAD_LEAST_CHANNELS, can_convolve, paired, winograd_convolution
 
-# As the compiled code has them: beside 0 and infinity, each with both signs.
-_POINTS = {torch.float32: (0.5, 1.0, 2.0), torch.bfloat16: (sqrt(0.5), sqrt(2.0))}
+_POINTS = (-1.5, 0.5, sqrt(0.5)), (6.0, 2.0, sqrt(2.0))  # what a pair's rows are divided by, their squares, they themselves
 
 
 class WinogradConvolution:
@@ -35,7 +33,7 @@ class WinogradConvolution:
         assert can_compute(weight, dtype)
         self._padding, self._dilation, self._dtype = padding, dilation, dtype
         self._bias = torch.zeros(weight.shape[0]) if bias is None else bias.detach().float().clone()
-        matrices = _transformed(weight.detach(), _POINTS[dtype])
+        matrices = _transformed(weight.detach())
         self._weights = _grouped(matrices) if dtype == torch.float32 else paired(_evens_first(matrices))
 
     def __call__(self, x: Tensor, *, of_positive: bool = False, plus: Tensor | None = None, positive: bool = False) -> Tensor:
@@ -55,26 +53,21 @@ def can_compute(weight: Tensor, dtype: torch.dtype) -> bool:
     return kernel == [3, 3] and can_convolve(dtype) and enough
 
 
-def _transformed(weight: Tensor, points: tuple[float, ...]) -> Tensor:
-    """Kernels (O, C, 3, 3) to matrices (P^2, C, O) float32, P = 2 (1 + len(points)): their polynomials at the points.
-
-    Each is divided by what the polynomial that is 0 at the other points is at this one (Lagrange's interpolation)."""
-    finite = torch.tensor([0.0, *(sign * point for point in points for sign in (1, -1))], dtype=torch.float64)
-    apart = finite.unsqueeze(1) - finite
-    divisors = apart.fill_diagonal_(1).prod(1, keepdim=True)
-    at_infinity = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
-    g = torch.cat((finite.unsqueeze(1) ** torch.arange(3) / divisors, at_infinity))
+def _transformed(weight: Tensor) -> Tensor:
+    """Kernels (O, C, 3, 3) to matrices (36, C, O) float32."""
+    pairs = [[1 / divisor, sign * point / divisor, square / divisor] for divisor, square, point in _POINTS for sign in (1, -1)]
+    g = torch.tensor([[1.0, 0.0, 0.0], *pairs, [0.0, 0.0, 1.0]], dtype=torch.float64)
     return torch.einsum("ia,jb,ocab->ijco", g, g, weight.double()).flatten(0, 1).float()
 
 
 def _grouped(matrices: Tensor) -> Tensor:
-    """(P, C, O) to (P, groups, C, COLUMNS), O filled up to whole groups."""
+    """(36, C, O) to (36, groups, C, COLUMNS), O filled up to whole groups."""
     filled = F.pad(matrices, (0, -matrices.shape[2] % COLUMNS))
     return filled.unflatten(2, (-1, COLUMNS)).transpose(1, 2).contiguous()
 
 
 def _evens_first(matrices: Tensor) -> Tensor:
-    """(P, C, O), of each full 32 channels in the even ones first, then the odd ones, as the compiled code has them."""
+    """(36, C, O), of each full 32 channels in the even ones first, then the odd ones, as the compiled code has them."""
     channels = matrices.shape[1]
     whole = channels - channels % 32
     order = torch.arange(whole).view(-1, 16, 2).transpose(1, 2).flatten()

@@ -165,7 +165,7 @@ def winograd_convolution(
 
     x: (1, C, H, W), channels_last, of a type that `can_convolve`. weights, of the same type: (36, groups, pairs,
     COLUMNS, 2), channels in by pairs, channels out in groups, both filled up with zeros; of each full 32 channels
-    in, the even ones come first, then the odd ones. In float32 (64, groups, C, COLUMNS), as they are. bias: (O,)
+    in, the even ones come first, then the odd ones. In float32 (36, groups, C, COLUMNS), as they are. bias: (O,)
     float32. plus: like `out`, or None. out: (1, O, H - 2 (dilation - padding), W - ...), channels_last, not x, of the same
     type. In float32 C and O are at least WINOGRAD_LEAST_CHANNELS.
     """
@@ -173,8 +173,8 @@ def winograd_convolution(
     (batch, channels, height, width), (_, outputs, *size) = x.shape, out.shape
     halved = x.dtype == torch.bfloat16
     groups = math.ceil(outputs / COLUMNS)
-    matrices = (36, groups, math.ceil(channels / 2), COLUMNS, 2) if halved else (64, groups, channels, COLUMNS)
-    assert weights.shape == matrices and weights.is_contiguous() and weights.dtype == x.dtype
+    kernels = (math.ceil(channels / 2), COLUMNS, 2) if halved else (channels, COLUMNS)
+    assert weights.shape == (36, groups, *kernels) and weights.is_contiguous() and weights.dtype == x.dtype
     assert batch == 1 and bias.shape == (outputs,) and (halved or min(channels, outputs) >= WINOGRAD_LEAST_CHANNELS)
     lost = 2 * (dilation - padding)
     assert size == [height - lost, width - lost] and min(size) > 0 and padding >= 0 and dilation >= 1

@@ -1,37 +1,8 @@
 /* winograd.h in float32, for processors whose registers hold eight values (AVX2). */
 #include "winograd.h"
 
-#define SIZE 8
-#define STEP 6
-#define PLACES (SIZE * SIZE)
-#define TILES 12 /* of a block */
 #define ROWS 6 /* tiles that are multiplied at once: with two registers each, sums fill twelve of sixteen registers */
 #define LANES 8
-
-/* The transform of eight samples, in place; the points are 0, +-1/2, +-1, +-2 and infinity. Each pair of points shares what
- * even and what odd samples make up. */
-PART void forward(Eight x[SIZE]) {
-    const Eight even_half = 4.0f * x[2] - 5.0f * x[4] + x[6], odd_half = 4.0f * x[1] - 5.0f * x[3] + x[5];
-    const Eight even_one = x[2] - 4.25f * x[4] + x[6], odd_one = x[1] - 4.25f * x[3] + x[5];
-    const Eight even_two = 0.25f * x[2] - 1.25f * x[4] + x[6], odd_two = 0.25f * x[1] - 1.25f * x[3] + x[5];
-    x[0] = 5.25f * (x[2] - x[4]) + x[6] - x[0];
-    x[7] = 5.25f * (x[3] - x[5]) + x[7] - x[1];
-    x[1] = even_half + 0.5f * odd_half, x[2] = even_half - 0.5f * odd_half;
-    x[3] = even_one + odd_one, x[4] = even_one - odd_one;
-    x[5] = even_two + 2.0f * odd_two, x[6] = even_two - 2.0f * odd_two;
-}
-
-/* The transform of eight products back to six samples, which come first. */
-PART void back(Eight x[SIZE]) {
-    const Eight half_sum = x[1] + x[2], one_sum = x[3] + x[4], two_sum = x[5] + x[6];
-    const Eight half_difference = x[1] - x[2], one_difference = x[3] - x[4], two_difference = x[5] - x[6];
-    x[0] = x[0] + half_sum + one_sum + two_sum;
-    x[1] = 0.5f * half_difference + one_difference + 2.0f * two_difference;
-    x[2] = 0.25f * half_sum + one_sum + 4.0f * two_sum;
-    x[3] = 0.125f * half_difference + one_difference + 8.0f * two_difference;
-    x[4] = 0.0625f * half_sum + one_sum + 16.0f * two_sum;
-    x[5] = 0.03125f * half_difference + one_difference + 32.0f * two_difference + x[7];
-}
 
 /* Floats from one of the places of a tile to the next. */
 PART Py_ssize_t inputs_of_a_place(const Winograd *w) { return spaced(TILES * w->channels * 4) / 4; }
@@ -63,11 +34,11 @@ PART void transform(const Winograd *w, Place at, Py_ssize_t channel, float *rest
     const Py_ssize_t place = inputs_of_a_place(w);
     for (int y = 0; y < SIZE; ++y) {
         read_row(w, at, y, channel, work[y]);
-        forward(work[y]);
+        FORWARD(work[y]);
     }
     for (int x = 0; x < SIZE; ++x) {
         for (int y = 0; y < SIZE; ++y) lane[y] = work[y][x];
-        forward(lane);
+        FORWARD(lane);
         for (int y = 0; y < SIZE; ++y) memcpy(inputs + (y * SIZE + x) * place + channel, &lane[y], sizeof lane[y]);
     }
 }
@@ -100,13 +71,13 @@ PART void transform_back(const Winograd *w, Place at, Py_ssize_t channel, const 
     const Py_ssize_t place = products_of_a_place(w);
     for (int x = 0; x < SIZE; ++x) {
         for (int y = 0; y < SIZE; ++y) lane[y] = eight_at(products + (y * SIZE + x) * place + channel);
-        back(lane);
+        BACK(lane);
         for (int y = 0; y < STEP; ++y) work[y][x] = lane[y];
     }
     const Eight bias = eight_at(w->bias + channel);
     const Py_ssize_t rows = pixels_within(t, at.top, t->height), columns = pixels_within(t, at.left, t->width);
     for (Py_ssize_t y = 0; y < rows; ++y) {
-        back(work[y]);
+        BACK(work[y]);
         for (Py_ssize_t x = 0; x < columns; ++x) {
             const Py_ssize_t pixel = (at.top + y * t->dilation) * t->width + at.left + x * t->dilation;
             const Py_ssize_t first = pixel * w->outputs + channel;
@@ -134,8 +105,7 @@ static void convolve_block(const Winograd *w, Py_ssize_t first, Py_ssize_t tiles
             transform_back(w, places[tile], channel, products + tile * w->groups * COLUMNS);
 }
 
-static int in_floats(Winograd *w, int threads) {
-    w->tiling.step = STEP;
+static int in_floats(const Winograd *w, int threads) {
     const Py_ssize_t tiles = tile_count(&w->tiling);
     int failed = 0;
 #pragma omp parallel num_threads(threads) reduction(| : failed)
@@ -154,7 +124,7 @@ static int in_floats(Winograd *w, int threads) {
 }
 
 PyObject *winograd_convolution(PyObject *Py_UNUSED(module), PyObject *arguments) {
-    Winograd w = {0};
+    Winograd w = {.tiling = {.step = STEP}};
     Tiling *t = &w.tiling;
     unsigned long long in, weights, bias, added, out;
     int halved, threads;

@@ -4,38 +4,11 @@
 
 #ifdef HALVED_COMPILED
 
-#define SIZE 6
-#define STEP 4
-#define PLACES (SIZE * SIZE)
-#define TILES 24 /* of a block */
 #define LANES 16
 #define ALL 0xFFFF /* lanes */
 #define AHEAD 1 /* tiles, for which memory is fetched beforehand */
 
 typedef float Sixteen __attribute__((vector_size(64)));
-
-/* The points of the transforms are 0, +-SMALL, +-1 / SMALL and infinity. */
-#define SMALL 0.70710678f
-#define LARGE 1.41421356f
-
-/* The transform of six samples, in place. */
-HALVED_PART void forward(Sixteen x[SIZE]) {
-    const Sixteen even = x[4] - 2.0f * x[2], odd = x[3] - 2.0f * x[1];
-    const Sixteen far_even = x[4] - 0.5f * x[2], far_odd = x[3] - 0.5f * x[1];
-    x[0] = x[0] + x[4] - 2.5f * x[2];
-    x[5] = x[1] + x[5] - 2.5f * x[3];
-    x[1] = even + SMALL * odd, x[2] = even - SMALL * odd;
-    x[3] = far_even + LARGE * far_odd, x[4] = far_even - LARGE * far_odd;
-}
-
-/* The transform of six products back to four samples, which come first. */
-HALVED_PART void back(Sixteen x[SIZE]) {
-    const Sixteen sum = x[1] + x[2], difference = x[1] - x[2], far_sum = x[3] + x[4], far_difference = x[3] - x[4];
-    x[0] = x[0] + sum + far_sum;
-    x[1] = SMALL * difference + LARGE * far_difference;
-    x[2] = 0.5f * sum + 2.0f * far_sum;
-    x[3] = (0.5f * SMALL) * difference + (2.0f * LARGE) * far_difference + x[5];
-}
 
 typedef struct {
     const uint16_t *samples[SIZE][SIZE]; /* where the channels of each begin: outside the picture there are zeros */
@@ -105,11 +78,11 @@ HALVED_PART void transform_sixteen(
             work[y][x] = floats_at(tile->samples[y][x] + channel, counting);
             if (w->of_positive) work[y][x] = not_negative(work[y][x]);
         }
-        forward(work[y]);
+        FORWARD(work[y]);
     }
     for (int x = 0; x < SIZE; ++x) {
         for (int y = 0; y < SIZE; ++y) lane[y] = work[y][x];
-        forward(lane);
+        FORWARD(lane);
         for (int y = 0; y < SIZE; ++y) put(inputs + (y * SIZE + x) * inputs_of_a_place(w) + channel, counting, lane[y]);
     }
 }
@@ -126,13 +99,13 @@ HALVED_PART void transform_many(const Winograd *w, const Tile *tile, Py_ssize_t 
             even[y][x] = (Sixteen)_mm512_castsi512_ps(_mm512_slli_epi32(both, 16));
             odd[y][x] = (Sixteen)_mm512_castsi512_ps(_mm512_and_si512(both, upper));
         }
-        forward(even[y]);
-        forward(odd[y]);
+        FORWARD(even[y]);
+        FORWARD(odd[y]);
     }
     for (int x = 0; x < SIZE; ++x) {
         for (int y = 0; y < SIZE; ++y) even_lane[y] = even[y][x], odd_lane[y] = odd[y][x];
-        forward(even_lane);
-        forward(odd_lane);
+        FORWARD(even_lane);
+        FORWARD(odd_lane);
         for (int y = 0; y < SIZE; ++y) {
             const __m512i both = (__m512i)_mm512_cvtne2ps_pbh((__m512)odd_lane[y], (__m512)even_lane[y]);
             _mm512_storeu_si512(inputs + (y * SIZE + x) * inputs_of_a_place(w) + channel, both);
@@ -155,13 +128,13 @@ HALVED_PART void transform_back(
     for (int x = 0; x < SIZE; ++x) {
         for (int y = 0; y < SIZE; ++y)
             lane[y] = (Sixteen)_mm512_loadu_ps(products + (y * SIZE + x) * w->groups * COLUMNS + channel);
-        back(lane);
+        BACK(lane);
         for (int y = 0; y < STEP; ++y) work[y][x] = lane[y];
     }
     const Sixteen bias = (Sixteen)_mm512_maskz_loadu_ps(counting, w->bias + channel);
     const Py_ssize_t rows = pixels_within(t, at.top, t->height), columns = pixels_within(t, at.left, t->width);
     for (Py_ssize_t y = 0; y < rows; ++y) {
-        back(work[y]);
+        BACK(work[y]);
         for (Py_ssize_t x = 0; x < columns; ++x) {
             const Py_ssize_t pixel = (at.top + y * t->dilation) * t->width + at.left + x * t->dilation;
             const Py_ssize_t first = pixel * w->outputs + channel;
@@ -194,8 +167,7 @@ __attribute__((HALVED)) static void convolve_block(
     }
 }
 
-int winograd_in_halves(Winograd *w, int threads) {
-    w->tiling.step = STEP;
+int winograd_in_halves(const Winograd *w, int threads) {
     const Py_ssize_t tiles = tile_count(&w->tiling);
     uint16_t *zeros = calloc(2 * pairs(w), sizeof(uint16_t));
     int failed = zeros == NULL;
@@ -217,6 +189,6 @@ int winograd_in_halves(Winograd *w, int threads) {
 
 #else
 
-int winograd_in_halves(Winograd *Py_UNUSED(w), int Py_UNUSED(threads)) { return 0; }
+int winograd_in_halves(const Winograd *Py_UNUSED(w), int Py_UNUSED(threads)) { return 0; }
 
 #endif
