@@ -1,11 +1,11 @@
 """Convolutions and products by the matrix unit against the same by their definition, in float64."""
 
 import os
-from pathlib import Path
 
 import pytest
 import torch
 import torch.nn.functional as F
+from processor import processor_flags
 from torch import Tensor, nn
 
 from lfcore import amx, kernels
@@ -24,15 +24,6 @@ def matrix_unit(compiled_kernels: None) -> None:
         if os.environ.get("CI") and not os.environ.get("ONEDNN_MAX_CPU_ISA"):
             assert not {"amx_tile", "amx_bf16", "avx512_bf16"} <= processor_flags()
         pytest.skip("this processor has no matrix unit for bfloat16 (AMX)")
-
-
-def processor_flags() -> set[str]:
-    """What Linux says of the processor, empty elsewhere."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return set()
-    return next((set(line.split()) for line in lines if line.startswith("flags")), set())
 
 
 def picture(channels: int, height: int, width: int) -> Tensor:
