@@ -86,7 +86,7 @@ SHIPPED = ("full", "realtime", "single", "planesweep", "mean")
 
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
 # It sleeps for a part of every sixtieth of a second, which is then theirs, so this takes nothing from them.
-PROCESS_NICENESS = 10
+PROCESS_NICENESS = 7  # where other programs keep all cores busy, with 10 too little is left for it (docs/speed.md)
 
 
 def synthesis_process() -> SynthesisProcess:

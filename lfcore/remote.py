@@ -52,9 +52,9 @@ _Answer = TypeVar("_Answer", Made, Taken, Finished)
 class SynthesisProcess:
     """A process in which synthesizers run. Safe to use from threads, which wait for each other.
 
-    make: what loads models there, a function of a module. niceness: how far it stands back behind other programs, where the
-    system knows that (0 to 19). Memory: the corner views and one synthesis, 20 to 48 bytes a pixel, are shared; what the
-    networks need is the process's own.
+    make: what loads models there, a function of a module. niceness: how far it stands back behind this program, where the
+    system knows that (0 to 19), from its first synthesis on; before, half as far. Memory: the corner views and one synthesis,
+    20 to 48 bytes a pixel, are shared; what the networks need is the process's own.
     """
 
     def __init__(self, make: MakeSynthesizer = shipped_models, niceness: int = 0) -> None:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
 
 import numpy as np
 
@@ -42,10 +43,12 @@ def shipped_models(model: str) -> Synthesizer:
 
 
 def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
-    """The whole life of the process. Ctrl-C, which the terminal sends to it too, is the program's to handle."""
+    """The whole life of the process. Ctrl-C, which the terminal sends to it too, is the program's to handle.
+
+    Until its first synthesis, for which everything else waits, it stands back half as far.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(os, "nice"):
-        os.nice(niceness)
+    _stand_back(niceness // 2)
     # Threads of the networks that wait for each other spin for a microsecond or two, then sleep: longer spinning would keep the
     # frame loop, and each other, from the cores (docs/speed.md). Read when torch is loaded.
     if "OMP_WAIT_POLICY" not in os.environ:
@@ -53,11 +56,28 @@ def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
     if make is shipped_models:
         import torch  # noqa: F401  # now, while the program opens its window and its file
     server = _Server(connection, make)
+    awaited = True
     with contextlib.suppress(EOFError, OSError):  # the program has ended
         while True:
             request: Request = connection.recv()
-            if not isinstance(request, Cancel):  # one that came too late
-                connection.send(server.reply(request))
+            if isinstance(request, Cancel):  # one that came too late
+                continue
+            reply = server.reply(request)
+            if awaited and isinstance(reply, Finished):
+                _stand_back(niceness - niceness // 2)
+                awaited = False
+            connection.send(reply)
+
+
+def _stand_back(further: int) -> None:
+    """Have this process give way to others by so much more, where the system knows priorities. On Linux each thread has its
+    own."""
+    if not hasattr(os, "setpriority"):
+        return
+    threads = [int(task.name) for task in Path("/proc/self/task").iterdir()] if sys.platform == "linux" else [0]
+    for thread in threads:
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + further)
 
 
 class _Server:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -43,6 +44,8 @@ class Blender:
                 if cancelled():
                     raise Cancelled
                 time.sleep(0.005)
+        if self.name == "threaded":
+            threading.Thread(target=time.sleep, args=(PATIENT_SECONDS,), daemon=True).start()
         if self.name == "wrong input":
             raise InputError("One sentence.")
         if self.name == "faulty":
