@@ -95,15 +95,25 @@ class VirtualScreen:
         running = subprocess.Popen(command, env=self.environment(), cwd=root, text=True, stderr=subprocess.PIPE)
         try:
             yield running
+        except BaseException:
+            state = "was still running" if running.poll() is None else f"had ended with {running.returncode}"
+            _end(running)
+            said = running.stderr.read() if running.stderr is not None and not running.stderr.closed else ""
+            print(f"the program on the virtual screen {state} and said: {said}", file=sys.stderr)
+            raise
         finally:
-            if running.poll() is None:
-                running.terminate()
-                try:
-                    running.wait(PATIENCE)
-                except subprocess.TimeoutExpired:
-                    running.kill()
+            _end(running)
             if running.stderr is not None:
                 running.stderr.close()
+
+
+def _end(running: subprocess.Popen[str]) -> None:
+    if running.poll() is None:
+        running.terminate()
+        try:
+            running.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            running.kill()
 
 
 @contextmanager
