@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -122,8 +123,8 @@ def _window(
 ) -> Iterator[tuple[_Window, Controller]]:
     """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
     window = _Window(keeping.settings.window if keeping is not None else None)
-    controller = Controller(engine, open_by_content, wake=glfw.post_empty_event, model=model, preview=preview, models=models)
-    surroundings = Surroundings(controller, glfw.post_empty_event, keeping)
+    controller = Controller(engine, open_by_content, wake=window.wake, model=model, preview=preview, models=models)
+    surroundings = Surroundings(controller, window.wake, keeping)
 
     def stop() -> None:
         surroundings.stop()
@@ -189,6 +190,7 @@ class _Window:
         self._frame_at = time.monotonic()  # by imgui's time
         self._cursor: int | None = None  # shape of the mouse that has been set
         self._interface: Interface | None = None
+        self._woken = threading.Event()  # by a worker, since the last look
         self._touched_at = 0.0  # last event of mouse or keyboard
         self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
         self._title = TITLE
@@ -253,13 +255,23 @@ class _Window:
                 glfw.wait_events_timeout(wait)
             else:
                 glfw.poll_events()
+            # Not told from the time alone: a worker may be done just as the wait ends. Cleared only where frames follow.
+            woken = time.monotonic() - before < wait
+            if self._woken.is_set():
+                self._woken.clear()
+                woken = True
             if self._touched_at >= before:
                 frames_due = min(max(frames_due + _FRAMES_PER_PRESS * self._presses, _SETTLE_FRAMES), _MOST_FRAMES)
                 self._presses = 0
-            elif time.monotonic() - before < wait:  # woken by a worker
+            elif woken:
                 frames_due = max(frames_due, _WOKEN_FRAMES)
             elif wait < _IDLE_INTERVAL:
                 frames_due = max(frames_due, 1)
+
+    def wake(self) -> None:
+        """Have frames drawn, since there is something new to show. May be called from any thread."""
+        self._woken.set()
+        glfw.post_empty_event()
 
     def poll_and_draw(self) -> None:
         """Take events and draw one frame, until the graphics are done with it."""
