@@ -190,7 +190,7 @@ class _Window:
         self._frame_at = time.monotonic()  # by imgui's time
         self._cursor: int | None = None  # shape of the mouse that has been set
         self._interface: Interface | None = None
-        self._woken = threading.Event()  # by a worker, since the last look
+        self._woken = threading.Event()  # by a worker, or by another size of the window, since the last look
         self._touched_at = 0.0  # last event of mouse or keyboard
         self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
         self._title = TITLE
@@ -209,6 +209,7 @@ class _Window:
         ):
             follow(self._window, self._resized)
         self._resized()
+        glfw.set_window_refresh_callback(self._window, lambda _: self._woken.set())  # a part of it has come into sight
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
 
@@ -255,11 +256,10 @@ class _Window:
                 glfw.wait_events_timeout(wait)
             else:
                 glfw.poll_events()
-            # Not told from the time alone: a worker may be done just as the wait ends. Cleared only where frames follow.
-            woken = time.monotonic() - before < wait
-            if self._woken.is_set():
+            # Not told from the time alone: a worker may be done just as the wait ends.
+            woken = self._woken.is_set() or time.monotonic() - before < wait
+            if woken:  # not otherwise: what comes just now must be seen the next time
                 self._woken.clear()
-                woken = True
             if self._touched_at >= before:
                 frames_due = min(max(frames_due + _FRAMES_PER_PRESS * self._presses, _SETTLE_FRAMES), _MOST_FRAMES)
                 self._presses = 0
@@ -350,6 +350,7 @@ class _Window:
 
     def _resized(self, *_: object) -> None:
         """Take note of size and scale, for which an X server is asked each time: a frame would wait for its answers."""
+        self._woken.set()
         self._size = glfw.get_framebuffer_size(self._window)
         # Content scale in imgui's units, which on some systems are scaled already.
         content = max(glfw.get_window_content_scale(self._window))
