@@ -62,6 +62,24 @@ def test_operations_are_those_that_torch_counts_in_the_convolutions(config: Conf
     assert sum(network_operations(config, (SIDE, SIDE)).values()) == counted
 
 
+@pytest.mark.parametrize(("seconds", "sizes"), [(10.0, {1024}), (0.1, {1024, 2048})])
+def test_what_a_machine_is_slow_at_is_measured_by_small_products_alone(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, sizes: set[int]
+) -> None:
+    """Without instructions for bfloat16 one large product of it takes a minute."""
+    asked, clock = [], [0.0]
+
+    def product(a: torch.Tensor, b: torch.Tensor) -> None:
+        asked.append(a.shape[0])
+        clock[0] += seconds
+
+    monkeypatch.setattr(torch, "mm", product)
+    monkeypatch.setattr(bench.time, "perf_counter", lambda: clock[0])
+    ceiling = bench.measure_ceiling()
+    assert set(asked) == sizes
+    assert (ceiling.bf16, ceiling.fp32) == pytest.approx((2 * max(sizes) ** 3 / seconds / 1e12,) * 2)
+
+
 def test_the_paper_s_networks_ask_for_a_third_of_a_billion_products() -> None:
     """The paper's size: 334 billion multiply-adds a view, and a few more for the border."""
     assert sum(network_operations(ModelConfig(), (376, 541)).values()) / 2 == pytest.approx(334e9, rel=0.03)
