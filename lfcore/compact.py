@@ -1,9 +1,10 @@
 """A small pair of networks of the paper's design, for real time: disparity from a plane sweep, then colour. No I/O here.
 
-What differs from the paper: the sweep runs at half resolution over fewer levels; the disparity network looks far (a stride and
-dilated layers), names a probability for every level, starts from the sweep's own minimum, and brings its result to full
-resolution by learned weights; the colour network works on 2 x 2 blocks of pixels, weighs the four warped inputs and adds what
-is missing. Both see pictures in the root tone (lfcore.tone), which evens out exposure and noise.
+What differs from the paper: the sweep runs at half resolution over fewer levels, and its means are left out, which told nothing
+that the deviations do not; the disparity network looks far (a stride and dilated layers), names a probability for every level,
+starts from the sweep's own minimum, and brings its result to full resolution by learned weights; the colour network works on
+2 x 2 blocks of pixels, weighs the four warped inputs and adds what is missing. Both see pictures in the root tone
+(lfcore.tone), which evens out exposure and noise.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from lfcore.planesweep import Levels
 from lfcore.tone import stored_from_root
 
 AGREEMENT_REACH = 2  # pixels of half resolution around each over which the sweep's deviation is looked at
+DEVIATION_SCALE = 10.0  # brings them to about 1
 ALIGNMENT = 4  # height and width must be whole numbers of so many pixels: half resolution, and a stride of 2 from there
 
 
@@ -28,9 +30,9 @@ class CompactConfig:
     """What a weight file must match."""
 
     name: str = "realtime"
-    levels: Levels = field(default_factory=lambda: Levels(48))
+    levels: Levels = field(default_factory=lambda: Levels(32))
     width: int = 64  # channels of the disparity network at a quarter of the resolution
-    dilations: tuple[int, ...] = (1, 2, 4, 8, 1)  # of its residual blocks
+    dilations: tuple[int, ...] = (1, 8)  # of its residual blocks
     fine_width: int = 48  # its channels at half resolution
     colour_width: int = 48
     colour_blocks: int = 2
@@ -60,9 +62,9 @@ class ResidualBlock(nn.Module):
 
 
 class CompactDisparity(nn.Module):
-    """Features of the half-resolution sweep to disparity at full resolution.
+    """Deviations of the half-resolution sweep to disparity at full resolution.
 
-    (B, 2 L, h, w) means and deviations, h and w even -> (B, 1, 2 h, 2 w), px of full resolution over the full baseline.
+    (B, L, h, w), h and w even -> (B, 1, 2 h, 2 w), px of full resolution over the full baseline.
     """
 
     values: Tensor
@@ -70,26 +72,25 @@ class CompactDisparity(nn.Module):
     def __init__(self, config: CompactConfig) -> None:
         super().__init__()
         count, width, fine = config.levels.count, config.width, config.fine_width
-        self.stem = nn.Conv2d(2 * count, width, 3, stride=2, padding=1)
+        self.stem = nn.Conv2d(count, width, 3, stride=2, padding=1)
         self.blocks = nn.Sequential(*(ResidualBlock(width, dilation) for dilation in config.dilations))
         self.rise = nn.Conv2d(width, 4 * fine, 1)
-        self.skip = nn.Conv2d(2 * count, fine, 3, padding=1)
+        self.skip = nn.Conv2d(count, fine, 3, padding=1)
         self.join = nn.Conv2d(fine, fine, 3, padding=1)
         self.score = nn.Conv2d(fine, count, 1)  # of each level
         self.spread = nn.Conv2d(fine, 4 * 9, 1)  # weights of nine neighbours for each of four pixels
         self.sharpness = nn.Parameter(torch.tensor(30.0))  # how steeply a level's score falls with its deviation
         self.register_buffer("values", config.levels.values(), persistent=False)
 
-    def forward(self, features: Tensor) -> Tensor:
-        count = self.values.numel()
-        scaled = torch.cat((4 * features[:, :count] - 2, 10 * features[:, count:]), 1)
+    def forward(self, deviations: Tensor) -> Tensor:
+        scaled = DEVIATION_SCALE * deviations
         coarse = F.relu(self.rise(F.relu(self.blocks(self.stem(scaled)))))
         h = F.relu(F.pixel_shuffle(coarse, 2) + self.skip(scaled))
         h = F.relu(h + self.join(h))
-        with torch.autocast(features.device.type, enabled=False):  # in bfloat16 the mean over levels would be rounded
+        with torch.autocast(deviations.device.type, enabled=False):  # in bfloat16 the mean over levels would be rounded
             h = h.float()
             # The start is the paper's classical forebear: the level at which the inputs agree best in a small window.
-            agreement = mean_around(features[:, count:].float(), AGREEMENT_REACH)
+            agreement = mean_around(deviations.float(), AGREEMENT_REACH)
             logits = self.score(h) - self.sharpness * agreement
             coarse_disparity = (logits.softmax(1) * self.values.view(1, -1, 1, 1)).sum(1, keepdim=True)
             return spread_out(coarse_disparity, self.spread(h))

@@ -11,18 +11,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from lfcore.compact import CompactModel, ResidualBlock, log_nearness
+from lfcore.compact import DEVIATION_SCALE, CompactModel, ResidualBlock, log_nearness
 from lfcore.compact_parts import LOGITS, MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
 from lfcore.layers import Layer, make_layer
 from lfcore.tuned_stack import Tuning
-
-# The scales that CompactDisparity gives its features, without the shift, which `sweep_input` gives.
-_MEAN_SCALE, _MEAN_SHIFT, _DEVIATION_SCALE = 4.0, -2.0, 10.0
-
-
-def sweep_input(luma: Tensor) -> Tensor:
-    """The luminance over which the plane sweep for `CompactInference` runs."""
-    return _MEAN_SCALE * luma + _MEAN_SHIFT
 
 
 @dataclass(frozen=True)
@@ -44,19 +36,17 @@ class CompactInference:
     def __init__(self, model: CompactModel, tuning: Tuning) -> None:
         self.dtype, self._way = tuning.dtype, tuning.way
         config, disparity, colour = model.config, model.disparity, model.colour
-        levels = config.levels.count
         with torch.no_grad():
-            features = torch.ones(2 * levels)
-            features[levels:] = _DEVIATION_SCALE / _MEAN_SCALE  # the sweep's input carries the scale of the means
-            self._stem = self._layer(disparity.stem, features)
-            self._skip = self._layer(disparity.skip, features)
+            scale = torch.full((config.levels.count,), DEVIATION_SCALE)
+            self._stem = self._layer(disparity.stem, scale)
+            self._skip = self._layer(disparity.skip, scale)
             self._blocks = self._block_layers(disparity.blocks)
             # By phase, then channel: so that a pixel's channels stay together when the phases are put side by side.
             self._rise = self._layer(disparity.rise, outputs=_by_phase(config.fine_width))
             self._join = self._layer(disparity.join)
-            sharpness = float(disparity.sharpness) / _MEAN_SCALE
             self._parts = parts_of(
-                Heads(_matrix(disparity.score), _matrix(disparity.spread), config.levels.values(), sharpness), tuning.dtype
+                Heads(_matrix(disparity.score), _matrix(disparity.spread), config.levels.values(), float(disparity.sharpness)),
+                tuning.dtype,
             )
             x_scale = torch.cat((torch.full((12,), 4.0), torch.full((48,), 10.0), torch.ones(2), torch.full((2,), 0.2)))
             order = gathered_order()
@@ -90,12 +80,12 @@ class CompactInference:
         """Corner views (4, 3, H, W) in the root tone, continued beyond their edges, as `warp` takes them."""
         return self._parts.prepared(toned - MIDDLE)
 
-    def disparity(self, features: Tensor) -> Tensor:
-        """(1, 2 L, h, w) of the sweep over `sweep_input`, channels_last, to the phases (4, h, w) of the disparity, px."""
-        coarse = _residuals(self._stem(features), self._blocks)
+    def disparity(self, deviations: Tensor) -> Tensor:
+        """(1, L, h, w) of the sweep, channels_last, to the phases (4, h, w) of the disparity, px."""
+        coarse = _residuals(self._stem(deviations), self._blocks)
         risen = _side_by_side(self._rise(coarse, of_positive=True, positive=True))
-        fine = self._skip(features, plus=risen, positive=True)
-        return self._parts.disparity(self._join(fine, plus=fine, positive=True), features)
+        fine = self._skip(deviations, plus=risen, positive=True)
+        return self._parts.disparity(self._join(fine, plus=fine, positive=True), deviations)
 
     def warp(self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]) -> Gathered:
         """`prepared` corners, continued by `reach` px, warped by the phases of a disparity. offsets: (4, 2), p_i - q;

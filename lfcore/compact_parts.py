@@ -53,8 +53,8 @@ class Parts(Protocol):
     def prepared(self, corners: Tensor) -> Tensor:
         """Corner views (4, 3, H, W) in the root tone less MIDDLE, continued by `reach`, as `gathered` takes them."""
 
-    def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
-        """Hidden channels (1, C, h, w), not negative, and features of the sweep (1, 2 L, h, w) to phases (4, h, w), px."""
+    def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
+        """Hidden channels (1, C, h, w), not negative, and the sweep's deviations (1, L, h, w) to phases (4, h, w), px."""
 
     def gathered(
         self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
@@ -101,8 +101,8 @@ class CompiledParts:
         """(4, H, W, 4): the colours of a pixel, and one value more, side by side."""
         return F.pad(corners.permute(0, 2, 3, 1), (0, 1)).to(kernels.warp_type(self._dtype)).contiguous()
 
-    def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
-        return kernels.compact_disparity(pixels, features, self._score, self._values, self._spread, self._sharpness)
+    def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
+        return kernels.compact_disparity(pixels, deviations, self._score, self._values, self._spread, self._sharpness)
 
     def gathered(
         self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
@@ -133,11 +133,11 @@ class TorchParts:
         """As they are."""
         return corners
 
-    def disparity(self, pixels: Tensor, features: Tensor) -> Tensor:
+    def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
         _, _, h, w = pixels.shape
-        heads, levels = self._heads, len(self._heads.values)
+        heads = self._heads
         rows = pixels.permute(0, 2, 3, 1).reshape(h * w, -1).float()  # (h w, C)
-        agreement = mean_around(features[:, levels:].to(torch.float32, memory_format=torch.channels_last), AGREEMENT_REACH)
+        agreement = mean_around(deviations.to(torch.float32, memory_format=torch.channels_last), AGREEMENT_REACH)
         scores = torch.addmm(heads.score[1], rows, heads.score[0].T)  # (h w, L)
         scores.sub_(agreement.permute(0, 2, 3, 1).reshape(h * w, -1), alpha=heads.sharpness)
         coarse = (scores.softmax(1) @ heads.values).view(1, 1, h, w)

@@ -11,11 +11,11 @@ from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
 from lfcore.compact import ALIGNMENT, CompactModel
-from lfcore.compact_inference import Coloured, CompactInference, sweep_input
+from lfcore.compact_inference import Coloured, CompactInference
 from lfcore.compact_parts import Gathered, full_size
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
-from lfcore.planesweep import Levels, Window, luminance, plane_sweep
+from lfcore.planesweep import Levels, Window, deviation_sweep, luminance
 from lfcore.synthesis import LateSynthesis
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
@@ -66,7 +66,7 @@ class CompactSynthesizer:
         padded = continued(corner_tensor(light_field))
         self._size = light_field.height, light_field.width
         self._corners = self._networks.prepared(root_tone(padded))
-        self._luma = sweep_input(half_luma(padded).unsqueeze(1))
+        self._luma = half_luma(padded).unsqueeze(1)
 
     @property
     def weighs(self) -> bool:
@@ -96,11 +96,11 @@ class CompactSynthesizer:
         clock = Clock()
         with torch.inference_mode():
             check_cancelled(cancelled)
-            features = torch.empty(1, 2 * levels.count, h, w, dtype=self.dtype, memory_format=torch.channels_last)
-            plane_sweep(self._luma, offsets, levels, half, features)
+            deviations = torch.empty(1, levels.count, h, w, dtype=self.dtype, memory_format=torch.channels_last)
+            deviation_sweep(self._luma, offsets, levels, half, deviations)
             clock.lap("features")
             check_cancelled(cancelled)
-            disparity = self._networks.disparity(features)  # (4, h, w), phases
+            disparity = self._networks.disparity(deviations)  # (4, h, w), phases
             clock.lap("disparity")
             check_cancelled(cancelled)
             gathered = self._networks.warp(self._corners, disparity, offsets, REACH, (u, v))

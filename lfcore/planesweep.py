@@ -78,9 +78,20 @@ def plane_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, o
     then the L standard deviations (with N - 1). `out` of that shape, of any float type and order, takes the result in place
     of a new tensor. Beside it, memory for N + 4 blocks of _BLOCK_VALUES.
     """
-    if out is None:
-        shape = (luma.shape[1], 2 * levels.count, *window.shape)
-        out = torch.empty(shape, device=luma.device, memory_format=torch.channels_last)
+    return _sweep(luma, offsets, levels, window, _room(luma, 2 * levels.count, window) if out is None else out)
+
+
+def deviation_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor | None = None) -> Tensor:
+    """As `plane_sweep`, but the L standard deviations alone: (B, L, h, w)."""
+    return _sweep(luma, offsets, levels, window, _room(luma, levels.count, window) if out is None else out)
+
+
+def _room(luma: Tensor, channels: int, window: Window) -> Tensor:
+    return torch.empty((luma.shape[1], channels, *window.shape), device=luma.device, memory_format=torch.channels_last)
+
+
+def _sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> Tensor:
+    """Into `out`, which has channels for means and deviations or for deviations alone."""
     if kernels.can_sweep(luma, out):
         _sweep_compiled(luma, offsets, levels, window, out)
     else:
@@ -89,7 +100,7 @@ def plane_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, o
 
 
 def _sweep_compiled(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> None:
-    """`plane_sweep` by the compiled kernel."""
+    """`_sweep` by the compiled kernel."""
     shifts = levels.values().double()[None, :, None] * offsets.double()[:, None]  # (N, L, 2), along x and y
     whole = shifts.floor()
     height, width = luma.shape[-2:]
@@ -99,8 +110,8 @@ def _sweep_compiled(luma: Tensor, offsets: Tensor, levels: Levels, window: Windo
 
 
 def _sweep_by_torch(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> None:
-    """`plane_sweep` by operations of torch."""
-    means, deviations = out.split(levels.count, 1)
+    """`_sweep` by operations of torch."""
+    *means, deviations = out.split(levels.count, 1)
     values = levels.values().double()
     for first in range(0, levels.count, _BLOCK_LEVELS):
         chosen = slice(first, first + _BLOCK_LEVELS)
@@ -115,7 +126,8 @@ def _sweep_by_torch(luma: Tensor, offsets: Tensor, levels: Levels, window: Windo
             mean, deviation = mean_and_deviation(shifted, counted)
             rows = slice(block.top - window.top, block.bottom - window.top)
             columns = slice(block.left - window.left, block.right - window.left)
-            means[:, chosen, rows, columns] = mean
+            for place in means:
+                place[:, chosen, rows, columns] = mean
             deviations[:, chosen, rows, columns] = deviation
 
 

@@ -65,7 +65,10 @@ def load_weights(path: Path) -> Weights:
     expected = {name: tuple(value.shape) for name, value in model.state_dict().items()}
     found = {name: tuple(value.shape) for name, value in tensors.items()}
     if expected != found:
-        raise WeightsError(f"{path} holds weights of another model than its config says; train or get it anew.")
+        name = config.name
+        raise WeightsError(
+            f"{path} holds weights of another shape than {name} has here (of an older version, perhaps); train {name} anew."
+        )
     digest = _digest(_json(path, metadata, "config"), tensors)
     if digest != metadata.get("digest"):
         raise WeightsError(f"{path} is damaged: its weights do not match their digest; get a fresh copy.")

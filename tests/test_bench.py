@@ -51,7 +51,7 @@ def test_operations_are_those_that_torch_counts_in_the_convolutions(config: Conf
     model, wide = build_model(config), SIDE + 2 * BORDER
     with torch.inference_mode(), FlopCounterMode(display=False) as counter:
         if isinstance(model, CompactModel):
-            model.disparity(torch.zeros(1, 16, SIDE // 2, SIDE // 2))
+            model.disparity(torch.zeros(1, 8, SIDE // 2, SIDE // 2))
             model.colour(torch.zeros(1, 12, SIDE, SIDE), torch.zeros(1, 1, SIDE, SIDE), torch.zeros(1, 2))
         elif isinstance(model, FullModel):
             model.disparity(torch.zeros(1, 16, wide, wide))

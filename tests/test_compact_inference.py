@@ -6,11 +6,11 @@ import torch
 from lfcore import kernels
 from lfcore import winograd as winograds
 from lfcore.compact import CompactConfig, CompactModel, initialise_compact
-from lfcore.compact_inference import CompactInference, sweep_input
+from lfcore.compact_inference import CompactInference
 from lfcore.compact_parts import MIDDLE, full_size
 from lfcore.compact_synthesizer import REACH
 from lfcore.layers import Way
-from lfcore.planesweep import Levels, Window, plane_sweep
+from lfcore.planesweep import Levels, Window, deviation_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tuned_stack import Tuning
 from lfcore.warp import quick_warp
@@ -57,9 +57,9 @@ def test_the_disparity_is_that_of_the_model(
     luma, offsets, window = torch.rand(4, 1, 40, 44), corner_offsets(0.3, 0.6), Window(13, 27, 13, 31)
     levels = Levels(12, -4.5, 4.5)
     with torch.inference_mode():
-        expected = model.disparity(plane_sweep(luma, offsets, levels, window))
-        features = plane_sweep(sweep_input(luma), offsets, levels, window).to(dtype)
-        found = CompactInference(model, Tuning(dtype, way=way)).disparity(features)
+        deviations = deviation_sweep(luma, offsets, levels, window)
+        expected = model.disparity(deviations)
+        found = CompactInference(model, Tuning(dtype, way=way)).disparity(deviations.to(dtype))
     assert float(expected.std()) > 0.1
     if dtype == torch.float32:
         torch.testing.assert_close(full_size(found)[None, None], expected, atol=2e-4, rtol=1e-4)

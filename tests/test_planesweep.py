@@ -5,7 +5,7 @@ from scenes import plane
 from slow import features as slow_features
 
 from lfcore.lightfield import CORNERS
-from lfcore.planesweep import Levels, Window, luminance, matching_disparity, plane_sweep
+from lfcore.planesweep import Levels, Window, deviation_sweep, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor
 
 pytestmark = pytest.mark.usefixtures("either_route")
@@ -28,6 +28,19 @@ def test_features_equal_a_slow_computation_by_definition(u: float, v: float) -> 
     luma, levels, window = random_luma(), Levels(7, -21, 21), Window(0, 14, 0, 17)
     found = plane_sweep(luma, corner_offsets(u, v), levels, window)[0]
     np.testing.assert_allclose(found, slow_sweep(luma[:, 0].numpy(), corner_offsets(u, v), levels, window), atol=2e-6)
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+@pytest.mark.parametrize("count", [2, 7, 16])
+def test_deviations_alone_are_those_of_the_whole_sweep(count: int, dtype: torch.dtype) -> None:
+    luma, levels, window = random_luma(5, (23, 37), batch=2), Levels(count, -21, 21), Window(1, 22, 3, 36)
+    offsets = corner_offsets(0.8, 0.3)
+    expected = plane_sweep(luma, offsets, levels, window)[:, count:].to(dtype)
+    around = torch.full((2, count + 1, 21, 33), 7.0, dtype=dtype).to(memory_format=torch.channels_last)
+    found = deviation_sweep(luma, offsets, levels, window, around[:, :count])
+    torch.testing.assert_close(found, expected, atol=4e-3 if dtype is torch.bfloat16 else 1e-6, rtol=0)
+    assert torch.equal(around[:, count], torch.full((2, 21, 33), 7.0, dtype=dtype))
+    torch.testing.assert_close(deviation_sweep(luma, offsets, levels, window).to(dtype), found)
 
 
 def test_no_sample_inside_the_picture_gives_zero_and_one_gives_no_deviation() -> None:

@@ -56,29 +56,31 @@ def can_sweep(luma: Tensor, out: Tensor) -> bool:
         _KERNELS is not None
         and luma.device.type == out.device.type == "cpu"
         and luma.dtype == torch.float32
-        and out.dtype in (torch.float32, torch.bfloat16)
+        and (out.dtype == torch.float32 or (out.dtype == torch.bfloat16 and out.shape[1] % 2 == 0))  # written in pairs
         and out.stride(1) == 1
         and not (luma.requires_grad and torch.is_grad_enabled())
     )
 
 
 def plane_sweep(luma: Tensor, whole: Tensor, taps: Tensor, valid: Tensor, corner: tuple[int, int], out: Tensor) -> None:
-    """Mean and deviation at each of L levels over the N inputs (N, B, H, W) that count there.
+    """Mean and deviation, or the deviation alone, at each of L levels over the N inputs (N, B, H, W) that count there.
 
     whole: (N, L, 2), whole pixels of the shift of each input and level along x and y. taps: (N, L, 2, 4), the weights of the
     samples at -1, 0, 1, 2 past it; samples beyond an edge repeat it. valid: (N, L, 2, 2), of the novel view's columns and rows
     the first that counts and the one past the last. corner: (top, left), the place in the novel view of the first pixel
-    of `out`, (B, 2 L, h, w), channels side by side: the L means, then the L deviations. Arguments as `can_sweep` wants them.
+    of `out`, (B, 2 L, h, w), channels side by side: the L means, then the L deviations; or (B, L, h, w), the deviations.
+    Arguments as `can_sweep` wants them.
     """
     assert _KERNELS is not None
     luma, taps = luma.contiguous(), taps.float().contiguous()
     whole, valid = whole.int().contiguous(), valid.int().contiguous()
     inputs, batch, height, width = luma.shape
-    levels, rows, columns = out.shape[1] // 2, *out.shape[2:]
+    levels, (channels, rows, columns) = whole.shape[1], out.shape[1:]
+    assert channels in (levels, 2 * levels)
     assert whole.shape == (inputs, levels, 2) and taps.shape == (inputs, levels, 2, 4) and valid.shape == (inputs, levels, 2, 2)
     assert out.shape[0] == batch
     tables = (luma.data_ptr(), whole.data_ptr(), taps.data_ptr(), valid.data_ptr(), out.data_ptr())
-    sizes = (inputs, batch, height, width, levels, *corner, rows, columns)
+    sizes = (inputs, batch, height, width, levels, channels, *corner, rows, columns)
     layout = (out.stride(0), out.stride(2), out.stride(3), out.dtype == torch.bfloat16)
     _KERNELS.plane_sweep(*tables, *sizes, *layout, torch.get_num_threads())
 
@@ -296,7 +298,7 @@ class PixelMatrix:
 
 def compact_disparity(
     pixels: Tensor,
-    features: Tensor,
+    deviations: Tensor,
     score: PixelMatrix,
     values: Tensor,
     spread: PixelMatrix,
@@ -304,21 +306,21 @@ def compact_disparity(
 ) -> Tensor:
     """The last steps of lfcore.compact.CompactDisparity, from its hidden channels to the four phases of the disparity.
 
-    pixels: (1, C, h, w), not negative, and features: (1, 2 L, h, w) of the sweep, both channels_last and of one type,
+    pixels: (1, C, h, w), not negative, and deviations: (1, L, h, w) of the sweep, both channels_last and of one type,
     bfloat16 or float32. score: (C, P), P not less than L; what goes beyond L must have a bias that is never chosen. values:
     (P,) float32, px. spread: (C, 48): column 4 k + phase is the score of neighbour k of nine, columns from 36 on do not
     count. Returns (4, h, w) float32, px.
     """
     assert _KERNELS is not None
     _, channels, height, width = pixels.shape
-    levels, outputs = features.shape[1] // 2, values.numel()
-    assert features.shape == (1, 2 * levels, height, width) and levels <= outputs
+    levels, outputs = deviations.shape[1], values.numel()
+    assert deviations.shape == (1, levels, height, width) and levels <= outputs
     assert score.weights.shape == (channels, outputs) and spread.weights.shape == (channels, 48)
-    _check((pixels, features), (score.weights, score.bias, values, spread.weights, spread.bias))
+    _check((pixels, deviations), (score.weights, score.bias, values, spread.weights, spread.bias))
     coarse, disparity = torch.empty(height, width), torch.empty(4, height, width)
     dtype = pixels.dtype
     matrices = (score.addresses(dtype), values.data_ptr(), spread.addresses(dtype))
-    parts = (*_addresses((pixels, features)), *matrices, *_addresses((coarse, disparity)))
+    parts = (*_addresses((pixels, deviations)), *matrices, *_addresses((coarse, disparity)))
     sizes = (height, width, channels, levels, outputs)
     halved = dtype == torch.bfloat16
     _KERNELS.compact_disparity(*parts, *sizes, sharpness, halved, halved and can_convolve(dtype), torch.get_num_threads())

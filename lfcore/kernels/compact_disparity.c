@@ -58,23 +58,23 @@ PART void row_products(
 
 /* The deviations of row y, summed over the rows around it, at columns from -BOX on: zero beyond the edges. */
 PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict sums) {
-    const Py_ssize_t w = d->width, outputs = d->outputs, row = 2 * w * d->levels;
+    const Py_ssize_t w = d->width, outputs = d->outputs, row = w * d->levels;
     const Py_ssize_t begin = at_least(y - BOX, 0), end = at_most(y + BOX + 1, d->height);
     memset(sums, 0, (w + 2 * BOX) * outputs * sizeof(float));
     for (Py_ssize_t x = 0; x < w; ++x) {
-        const Py_ssize_t first = begin * row + (2 * x + 1) * d->levels;
+        const Py_ssize_t first = begin * row + x * d->levels;
         float *restrict here = sums + (x + BOX) * outputs;
         Py_ssize_t level = 0;
         for (; level + 8 <= d->levels; level += 8) {
-            Eight sum = eight_of(d->features, first + level, d->halved);
+            Eight sum = eight_of(d->deviations, first + level, d->halved);
             for (Py_ssize_t near = 1; near < end - begin; ++near)
-                sum += eight_of(d->features, first + level + near * row, d->halved);
+                sum += eight_of(d->deviations, first + level + near * row, d->halved);
             memcpy(here + level, &sum, sizeof sum);
         }
         for (; level < d->levels; ++level)
             for (Py_ssize_t near = 0; near < end - begin; ++near) {
                 float value;
-                as_floats(d->features, first + level + near * row, 1, d->halved, &value);
+                as_floats(d->deviations, first + level + near * row, 1, d->halved, &value);
                 here[level] += value;
             }
     }
@@ -191,14 +191,14 @@ static Matrix matrix_at(const unsigned long long a[4]) {
 
 PyObject *compact_disparity(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Disparity d;
-    unsigned long long pixels, features, score[4], values, spread[4], coarse, disparity;
+    unsigned long long pixels, deviations, score[4], values, spread[4], coarse, disparity;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KK(KKKK)K(KKKK)KKnnnnnfppi", &pixels, &features, score, score + 1, score + 2, score + 3,
+    if (!PyArg_ParseTuple(arguments, "KK(KKKK)K(KKKK)KKnnnnnfppi", &pixels, &deviations, score, score + 1, score + 2, score + 3,
                           &values, spread, spread + 1, spread + 2, spread + 3, &coarse, &disparity, &d.height, &d.width, &d.channels, &d.levels,
                           &d.outputs, &d.sharpness, &d.halved, &d.wide, &threads))
         return NULL;
     d.pixels = at_address(pixels);
-    d.features = at_address(features);
+    d.deviations = at_address(deviations);
     d.score = matrix_at(score);
     d.values = at_address(values);
     d.spread = matrix_at(spread);

@@ -18,7 +18,7 @@ typedef struct {
 
 typedef struct {
     const void *pixels; /* (height, width, channels), not negative */
-    const void *features; /* (height, width, 2 levels): of the sweep, the latter half its deviations */
+    const void *deviations; /* (height, width, levels): of the sweep */
     int halved;
     Py_ssize_t height, width, channels, levels, outputs; /* outputs: the levels, filled up to a multiple of 16 */
     Matrix score; /* what is filled up is never to be chosen */

@@ -7,12 +7,12 @@
 
 /* The deviations of row y, summed over the rows around it, at columns from -BOX on: zero beyond the edges. */
 HALVED_PART void sum_rows(const Disparity *d, Py_ssize_t y, float *restrict sums) {
-    const Py_ssize_t w = d->width, outputs = d->outputs, row = 2 * w * d->levels;
+    const Py_ssize_t w = d->width, outputs = d->outputs, row = w * d->levels;
     const Py_ssize_t begin = at_least(y - BOX, 0), end = at_most(y + BOX + 1, d->height);
     memset(sums, 0, BOX * outputs * sizeof *sums);
     memset(sums + (BOX + w) * outputs, 0, BOX * outputs * sizeof *sums);
     for (Py_ssize_t x = 0; x < w; ++x) {
-        const uint16_t *first = (const uint16_t *)d->features + begin * row + (2 * x + 1) * d->levels;
+        const uint16_t *first = (const uint16_t *)d->deviations + begin * row + x * d->levels;
         for (Py_ssize_t level = 0; level < outputs; level += LANES) {
             const __mmask16 counting = (__mmask16)lanes_within(d->levels - level, LANES);
             __m512 sum = floats_at(first + level, counting);

@@ -8,8 +8,8 @@ typedef struct {
     const int32_t *whole; /* (inputs, levels, 2): whole pixels of each shift along x and y */
     const float *taps; /* (inputs, levels, 2, 4): weights of the samples at -1, 0, 1, 2 past it */
     const int32_t *valid; /* (inputs, levels, 2, 2): along x and y the first place that counts, and the one past the last */
-    void *out; /* (batch, rows, columns, 2 levels), the last contiguous */
-    Py_ssize_t inputs, batch, height, width, levels, top, left, columns;
+    void *out; /* (batch, rows, columns, channels), the last contiguous: means, then deviations of the levels, or these alone */
+    Py_ssize_t inputs, batch, height, width, levels, channels, top, left, columns;
     Py_ssize_t out_batch, out_row, out_pixel; /* strides in values */
     int halved; /* whether `out` is bfloat16, not float32 */
 } Sweep;
@@ -106,7 +106,7 @@ PART void of_some(const Sweep *sweep, const Span *spans, const float *shifted, S
 
 /* What a row needs while it is computed. */
 typedef struct {
-    float *moved, *counted, *shifted; /* (columns + 3), (columns), (inputs, columns) */
+    float *moved, *counted, *mean, *shifted; /* (columns + 3), (columns), (columns), (inputs, columns) */
     Span *spans; /* (inputs) */
 } Room;
 
@@ -186,8 +186,8 @@ PART void write_pixels(const float *rows, Py_ssize_t channels, Py_ssize_t w, int
 /* Rows `begin` to `end` of the window; 0, or -1 where there is no memory. */
 MANY_PROCESSORS
 static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
-    const Py_ssize_t w = sweep->columns, channels = 2 * sweep->levels, of_row = row_room(w);
-    const Py_ssize_t room_floats = (w + 3) + w + sweep->inputs * w;
+    const Py_ssize_t w = sweep->columns, channels = sweep->channels, of_row = row_room(w);
+    const Py_ssize_t room_floats = (w + 3) + 2 * w + sweep->inputs * w, means = channels - sweep->levels;
     float *memory = malloc((room_floats + at_least(channels, 16) * of_row) * sizeof(float));
     Span *spans = malloc(sweep->inputs * sizeof(Span));
     if (memory == NULL || spans == NULL) {
@@ -196,11 +196,12 @@ static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
         return -1;
     }
     float *rows = memory + room_floats;
-    const Room room = {memory, memory + w + 3, memory + w + 3 + w, spans};
+    const Room room = {memory, memory + w + 3, memory + w + 3 + w, memory + w + 3 + 2 * w, spans};
     for (Py_ssize_t k = 0; k < sweep->batch; ++k)
         for (Py_ssize_t y = begin; y < end; ++y) {
             for (Py_ssize_t level = 0; level < sweep->levels; ++level)
-                level_row(sweep, k, level, sweep->top + y, &room, rows + level * of_row, rows + (sweep->levels + level) * of_row);
+                level_row(sweep, k, level, sweep->top + y, &room, means ? rows + level * of_row : room.mean,
+                          rows + (means + level) * of_row);
             const Py_ssize_t size = sweep->halved ? 2 : 4, place = k * sweep->out_batch + y * sweep->out_row;
             write_pixels(rows, channels, w, sweep->halved, (char *)sweep->out + place * size, sweep->out_pixel * size);
         }
@@ -223,8 +224,8 @@ PyObject *plane_sweep(PyObject *Py_UNUSED(module), PyObject *arguments) {
     unsigned long long luma, whole, taps, valid, out;
     Py_ssize_t rows;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnnnpi", &luma, &whole, &taps, &valid, &out, &sweep.inputs, &sweep.batch,
-                          &sweep.height, &sweep.width, &sweep.levels, &sweep.top, &sweep.left, &rows, &sweep.columns,
+    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnnnnpi", &luma, &whole, &taps, &valid, &out, &sweep.inputs, &sweep.batch,
+                          &sweep.height, &sweep.width, &sweep.levels, &sweep.channels, &sweep.top, &sweep.left, &rows, &sweep.columns,
                           &sweep.out_batch, &sweep.out_row, &sweep.out_pixel, &sweep.halved, &threads))
         return NULL;
     sweep.luma = at_address(luma);

@@ -17,7 +17,7 @@ from lfcore.compact import CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
-from lfcore.planesweep import Levels, Window, plane_sweep
+from lfcore.planesweep import Levels, Window, deviation_sweep, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tone import root_tone
 from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
@@ -171,9 +171,9 @@ class CompactPair:
         return self._disparity(model, batch, _places(batch), autocast)
 
     def _disparity(self, model: CompactModel, batch: Batch, places: Sequence[_Place], autocast: Autocast) -> Tensor:
-        features = _half_sweep(places, batch, model.config.levels)
+        deviations = _half_sweep(places, batch, model.config.levels)
         with autocast():
-            disparity: Tensor = model.disparity(features)  # (., 1, P, P)
+            disparity: Tensor = model.disparity(deviations)  # (., 1, P, P)
         return disparity
 
 
@@ -241,10 +241,12 @@ def warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, origin: tupl
 
 
 def _half_sweep(places: Sequence[_Place], batch: Batch, levels: Levels) -> Tensor:
-    """Features of the small pair's disparity network, at half the resolution: (sum of B, 2 L, P / 2, P / 2)."""
+    """What the small pair's disparity network takes, at half the resolution: (sum of B, L, P / 2, P / 2)."""
     return torch.cat(
         [
-            plane_sweep(half_luma(place.images), offsets, half_resolution(levels.moved(-group.shift)), _halved(place.window))
+            deviation_sweep(
+                half_luma(place.images), offsets, half_resolution(levels.moved(-group.shift)), _halved(place.window)
+            )
             for place, offsets, group in zip(places, batch.offsets, batch.groups, strict=True)
         ]
     )
