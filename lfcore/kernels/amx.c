@@ -63,12 +63,13 @@ __attribute__((target(AMX))) static void multiply(const Products *p, Py_ssize_t 
 }
 
 static void multiply_all(const Products *p, Py_ssize_t matrices, int threads) {
+    Shares shares;
+    share_out(&shares, matrices, threads);
 #pragma omp parallel num_threads(threads)
     {
         TileShapes before;
         begin_tiles(&before);
-#pragma omp for schedule(dynamic, 1)
-        for (Py_ssize_t index = 0; index < matrices; ++index) multiply(p, index);
+        EACH_SHARED(index, &shares) multiply(p, index);
         end_tiles(&before);
     }
 }

@@ -10,6 +10,7 @@
 #define LFCORE_KERNELS_AMX_H
 
 #include "halved.h"
+#include "shares.h"
 
 #define ROWS 16 /* of a block */
 #define PIECE 32 /* values that are multiplied at once */

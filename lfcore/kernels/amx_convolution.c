@@ -96,6 +96,8 @@ static Py_ssize_t find_pieces(const Convolution *c, Py_ssize_t offsets[MOST_PIEC
 static int convolve(const Convolution *c, int threads) {
     Py_ssize_t offsets[MOST_PIECES];
     const Pieces pieces = {c->stride * c->channels * 2, offsets, find_pieces(c, offsets)};
+    Shares bands;
+    share_out(&bands, (c->result_height + c->band - 1) / c->band, threads);
     int failed = 0;
 #pragma omp parallel num_threads(threads) reduction(| : failed)
     {
@@ -106,9 +108,10 @@ static int convolve(const Convolution *c, int threads) {
         if (!failed) memset(copy + values, 0, PIECE * sizeof *copy);
         TileShapes before;
         begin_tiles(&before);
-#pragma omp for schedule(dynamic, 1)
-        for (Py_ssize_t first = 0; first < c->result_height; first += c->band)
+        EACH_SHARED(index, &bands) {
+            const Py_ssize_t first = index * c->band;
             if (!failed) convolve_band(c, &pieces, first, at_most(c->band, c->result_height - first), copy);
+        }
         end_tiles(&before);
         free(copy);
     }

@@ -9,6 +9,7 @@
 #define LFCORE_KERNELS_COMPACT_H
 
 #include "halved.h"
+#include "shares.h"
 
 typedef int32_t FourWhole __attribute__((vector_size(16)));
 typedef uint16_t EightHalves __attribute__((vector_size(16)));

@@ -43,8 +43,10 @@ static void blend_rows(const Blend *b, Py_ssize_t begin, Py_ssize_t end) {
 
 static void whole_blend(const Blend *b, int threads) {
     const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, b->height);
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
-    for (Py_ssize_t part = 0; part < parts; ++part)
+    Shares shares;
+    share_out(&shares, parts, threads);
+#pragma omp parallel num_threads(threads)
+    EACH_SHARED(part, &shares)
         (b->shortened ? blend_rows_in_halves : blend_rows)(b, b->height * part / parts, b->height * (part + 1) / parts);
 }
 

@@ -172,14 +172,16 @@ static int fine_rows(const Disparity *d, Py_ssize_t begin, Py_ssize_t end) {
 
 static int whole_disparity(const Disparity *d, int threads) {
     const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, d->height);
+    Shares coarse, fine;
+    share_out(&coarse, parts, threads);
+    share_out(&fine, parts, threads);
     int failed = 0;
 #pragma omp parallel num_threads(threads) reduction(| : failed)
     {
-#pragma omp for schedule(dynamic, 1)
-        for (Py_ssize_t part = 0; part < parts; ++part)
+        EACH_SHARED(part, &coarse)
             failed |= coarse_rows(d, d->height * part / parts, d->height * (part + 1) / parts);
-#pragma omp for schedule(dynamic, 1)
-        for (Py_ssize_t part = 0; part < parts; ++part)
+#pragma omp barrier
+        EACH_SHARED(part, &fine)
             failed |= fine_rows(d, d->height * part / parts, d->height * (part + 1) / parts);
     }
     return failed;

@@ -89,9 +89,11 @@ static int warp_rows(const Warp *warp, Py_ssize_t begin, Py_ssize_t end) {
 
 static int whole_warp(const Warp *warp, int threads) {
     const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, warp->height);
+    Shares shares;
+    share_out(&shares, parts, threads);
     int failed = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(| : failed)
-    for (Py_ssize_t part = 0; part < parts; ++part)
+#pragma omp parallel num_threads(threads) reduction(| : failed)
+    EACH_SHARED(part, &shares)
         failed |= (warp->shortened ? warp_rows_in_halves : warp_rows)(
             warp, warp->height * part / parts, warp->height * (part + 1) / parts);
     return failed;

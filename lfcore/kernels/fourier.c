@@ -2,11 +2,11 @@
  *
  * Sixteen channels lie in the lanes of a register, so that the transforms are plain arithmetic on registers.
  */
+#include "shares.h"
 #include "tiled.h"
 
 #define LANES 16
 #define SIZE 16 /* of a tile, px */
-#define TILES_OF_A_THREAD 4 /* that it does one after the other, since each has memory fetched for the next */
 
 /* As wide as the widest registers, which plain arithmetic gains from. */
 typedef float Sixteen __attribute__((vector_size(4 * LANES)));
@@ -245,8 +245,10 @@ static void backward(const Fourier *f, Py_ssize_t tile) {
 }
 
 static void all_tiles(const Fourier *f, void (*step)(const Fourier *, Py_ssize_t), int threads) {
-#pragma omp parallel for num_threads(threads) schedule(dynamic, TILES_OF_A_THREAD)
-    for (Py_ssize_t tile = 0; tile < f->tiles; ++tile) step(f, tile);
+    Shares shares; /* neighbouring tiles, since each has memory fetched for the next */
+    share_out(&shares, f->tiles, threads);
+#pragma omp parallel num_threads(threads)
+    EACH_SHARED(tile, &shares) step(f, tile);
 }
 
 /* Arguments of both, and the step itself. */

@@ -1,5 +1,5 @@
 /* Cubic interpolation at any places (lfcore.warp). */
-#include "common.h"
+#include "shares.h"
 
 typedef struct {
     const float *images; /* (images, channels, height, width) */
@@ -62,8 +62,10 @@ static void sample_places(const Samples *s, Py_ssize_t begin, Py_ssize_t end) {
 
 static void sample_all(const Samples *samples, int threads) {
     const Py_ssize_t places = samples->places, parts = at_most(threads * PARTS_PER_THREAD, places);
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
-    for (Py_ssize_t part = 0; part < parts; ++part)
+    Shares shares;
+    share_out(&shares, parts, threads);
+#pragma omp parallel num_threads(threads)
+    EACH_SHARED(part, &shares)
         sample_places(samples, places * part / parts, places * (part + 1) / parts);
 }
 

@@ -1,5 +1,5 @@
 /* The plane sweep: mean and deviation of shifted inputs (lfcore.planesweep). */
-#include "common.h"
+#include "shares.h"
 
 #define PIXELS_AT_ONCE 16 /* whose channels are written together: so many lines of the nearest cache */
 
@@ -212,9 +212,11 @@ static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
 
 static int sweep_all(const Sweep *sweep, Py_ssize_t rows, int threads) {
     const Py_ssize_t parts = at_most(threads * PARTS_PER_THREAD, rows);
+    Shares shares;
+    share_out(&shares, parts, threads);
     int failed = 0;
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) reduction(| : failed)
-    for (Py_ssize_t part = 0; part < parts; ++part)
+#pragma omp parallel num_threads(threads) reduction(| : failed)
+    EACH_SHARED(part, &shares)
         failed |= sweep_rows(sweep, rows * part / parts, rows * (part + 1) / parts);
     return failed;
 }

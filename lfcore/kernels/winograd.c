@@ -107,6 +107,8 @@ static void convolve_block(const Winograd *w, Py_ssize_t first, Py_ssize_t tiles
 
 static int in_floats(const Winograd *w, int threads) {
     const Py_ssize_t tiles = tile_count(&w->tiling);
+    Shares blocks;
+    share_out(&blocks, (tiles + TILES - 1) / TILES, threads);
     int failed = 0;
 #pragma omp parallel num_threads(threads) reduction(| : failed)
     {
@@ -114,9 +116,8 @@ static int in_floats(const Winograd *w, int threads) {
         float *inputs = calloc(PLACES * inputs_of_a_place(w), sizeof(float));
         float *products = malloc(PLACES * products_of_a_place(w) * sizeof(float));
         failed = inputs == NULL || products == NULL;
-#pragma omp for schedule(dynamic, 1)
-        for (Py_ssize_t first = 0; first < tiles; first += TILES)
-            if (!failed) convolve_block(w, first, at_most(TILES, tiles - first), inputs, products);
+        EACH_SHARED(block, &blocks)
+            if (!failed) convolve_block(w, block * TILES, at_most(TILES, tiles - block * TILES), inputs, products);
         free(inputs);
         free(products);
     }

@@ -8,6 +8,7 @@
 #define LFCORE_KERNELS_WINOGRAD_H
 
 #include "halved.h"
+#include "shares.h"
 #include "tiled.h"
 
 #define SIZE 6 /* of a tile, px */

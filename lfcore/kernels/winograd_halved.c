@@ -170,6 +170,8 @@ __attribute__((HALVED)) static void convolve_block(
 int winograd_in_halves(const Winograd *w, int threads) {
     const Py_ssize_t tiles = tile_count(&w->tiling);
     uint16_t *zeros = calloc(2 * pairs(w), sizeof(uint16_t));
+    Shares blocks;
+    share_out(&blocks, (tiles + TILES - 1) / TILES, threads);
     int failed = zeros == NULL;
 #pragma omp parallel num_threads(threads) reduction(| : failed)
     {
@@ -177,9 +179,8 @@ int winograd_in_halves(const Winograd *w, int threads) {
         uint16_t *inputs = calloc(PLACES * inputs_of_a_place(w), sizeof(uint16_t));
         float *products = malloc(TILES * products_of_a_tile(w) * sizeof(float));
         failed |= inputs == NULL || products == NULL;
-#pragma omp for schedule(dynamic, 1)
-        for (Py_ssize_t first = 0; first < tiles; first += TILES)
-            if (!failed) convolve_block(w, first, at_most(TILES, tiles - first), zeros, inputs, products);
+        EACH_SHARED(block, &blocks)
+            if (!failed) convolve_block(w, block * TILES, at_most(TILES, tiles - block * TILES), zeros, inputs, products);
         free(inputs);
         free(products);
     }
