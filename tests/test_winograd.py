@@ -152,6 +152,24 @@ def test_a_layer_computes_the_same_with_and_without_compiled_kernels(stride: int
     torch.testing.assert_close(found, F.conv2d(x, weight, bias, stride, dilation, dilation), atol=1e-3, rtol=0)
 
 
+@pytest.mark.usefixtures("compiled_kernels")
+@pytest.mark.parametrize("threads", [1, 2, 3, 9, 70])
+def test_any_number_of_threads_computes_the_whole_picture(threads: int) -> None:
+    """Fewer than the picture has blocks of tiles, more, and more than have blocks of their own."""
+    torch.manual_seed(9)
+    x, layer = picture(16, 60, 70), WinogradConvolution(torch.randn(16, 16, 3, 3), torch.randn(16), 1)
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        expected = layer(x)
+        torch.set_num_threads(threads)
+        for _ in range(5):
+            out = layer(x.clone(memory_format=torch.channels_last))
+            assert torch.equal(out, expected)
+    finally:
+        torch.set_num_threads(before)
+
+
 def test_layers_that_it_cannot_compute_are_refused() -> None:
     for shape in ((32, 16, 5, 5), (32, 7, 3, 3), (7, 16, 3, 3)):
         with pytest.raises(AssertionError):

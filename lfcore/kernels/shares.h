@@ -38,7 +38,8 @@ PART int own_run(const Shares *shares) {
 #ifdef _OPENMP
     return omp_get_thread_num() % shares->count;
 #else
-    return shares->count - 1;
+    (void)shares;
+    return 0;
 #endif
 }
 
@@ -53,7 +54,7 @@ PART Py_ssize_t take(Shares *shares, int *run) {
     return -1;
 }
 
-/* In each thread of a team: the parts that fall to it. */
+/* In each thread of a team: the parts that fall to it, one by one. The outer loop is there for its variables, and runs once. */
 #define EACH_SHARED(part, shares)                                                                                              \
     for (int run_ = own_run(shares), go_on_ = 1; go_on_; go_on_ = 0)                                                           \
         for (Py_ssize_t part; (part = take(shares, &run_)) >= 0;)
