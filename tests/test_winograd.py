@@ -1,6 +1,8 @@
 """Convolutions by Winograd's transforms against the same by their definition, in float64."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -157,17 +159,34 @@ def test_a_layer_computes_the_same_with_and_without_compiled_kernels(stride: int
 def test_any_number_of_threads_computes_the_whole_picture(threads: int) -> None:
     """Fewer than the picture has blocks of tiles, more, and more than have blocks of their own."""
     torch.manual_seed(9)
-    x, layer = picture(16, 60, 70), WinogradConvolution(torch.randn(16, 16, 3, 3), torch.randn(16), 1)
+    x, weight, bias = picture(16, 60, 70), torch.randn(16, 16, 3, 3), torch.randn(16)
+    layer, expected = WinogradConvolution(weight, bias, 1), F.conv2d(x, weight, bias, padding=1)
     before = torch.get_num_threads()
-    torch.set_num_threads(1)
+    torch.set_num_threads(threads)
     try:
-        expected = layer(x)
-        torch.set_num_threads(threads)
         for _ in range(5):
-            out = layer(x.clone(memory_format=torch.channels_last))
-            assert torch.equal(out, expected)
+            torch.full_like(expected, float("nan"))  # what is left in memory, where a part is computed by nobody
+            torch.testing.assert_close(layer(x), expected, atol=1e-3, rtol=0)
     finally:
         torch.set_num_threads(before)
+
+
+@pytest.mark.usefixtures("compiled_kernels")
+def test_fewer_threads_than_asked_for_take_the_others_parts_too() -> None:
+    """As where the system grants a process no more."""
+    script = """
+import torch
+from lfcore.winograd import WinogradConvolution
+x, weight = torch.randn(1, 16, 60, 70).to(memory_format=torch.channels_last), torch.randn(16, 16, 3, 3)
+torch.set_num_threads(5)
+expected = torch.nn.functional.conv2d(x, weight, padding=1)
+torch.full_like(expected, float("nan"))
+torch.testing.assert_close(WinogradConvolution(weight, None, 1)(x), expected, atol=1e-3, rtol=0)
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", script], env={**os.environ, "OMP_THREAD_LIMIT": "2"}, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
 
 
 def test_layers_that_it_cannot_compute_are_refused() -> None:
