@@ -12,9 +12,10 @@ from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
 from lfcore.errors import InputError
+from lfcore.fewer_means import kept_levels, with_fewer_means
 from lfcore.lightfield import LightField, check_viewpoint
 from lfcore.networks import BORDER, FullModel, colour_features, sweep_luminance
-from lfcore.planesweep import Window, plane_sweep
+from lfcore.planesweep import Window, sparse_sweep
 from lfcore.synthesis import LateSynthesis
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture, put
 from lfcore.tuned_stack import TunedStack, Tuning
@@ -38,7 +39,9 @@ class NetworkSynthesizer:
         self.key = key
         self.config = model.config
         self._tuning = tuning or machine_tuning()
-        self._disparity = TunedStack(model.disparity, self._tuning)
+        self._means = kept_levels(self.config.levels, self._tuning.means)
+        stack = with_fewer_means(model.disparity, self.config.levels, self._means)
+        self._disparity = TunedStack(stack, self._tuning)
         self._colour = TunedStack(model.colour, self._tuning)
         self._corners: Tensor | None = None  # (4, 3, H, W)
         self._luma: Tensor | None = None  # (4, 1, H, W)
@@ -61,6 +64,7 @@ class NetworkSynthesizer:
         corners, luma, levels = self._corners, self._luma, self.config.levels
         _, _, height, width = corners.shape
         offsets = corner_offsets(u, v)
+        channels = len(self._means) + levels.count
         clock, check = Clock(), partial(check_cancelled, cancelled)
         disparity = torch.empty(1, 1, height, width)
         image = torch.empty(1, 3, height, width)
@@ -68,7 +72,7 @@ class NetworkSynthesizer:
             for tile in self._tuning.tiles(height, width):
                 check()
                 features = self._disparity.empty_input(*tile.shape)
-                plane_sweep(luma, offsets, levels, tile.source, tile.inner(features)[:, : 2 * levels.count])
+                sparse_sweep(luma, offsets, levels, self._means, tile.source, tile.inner(features)[:, :channels])
                 tile.mirror(features)
                 clock.lap("features")
                 put(disparity, tile.window, self._disparity(features, check))

@@ -78,43 +78,46 @@ def plane_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, o
     then the L standard deviations (with N - 1). `out` of that shape, of any float type and order, takes the result in place
     of a new tensor. Beside it, memory for N + 4 blocks of _BLOCK_VALUES.
     """
-    return _sweep(luma, offsets, levels, window, _room(luma, 2 * levels.count, window) if out is None else out)
+    return sparse_sweep(luma, offsets, levels, range(levels.count), window, out)
 
 
 def deviation_sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor | None = None) -> Tensor:
     """As `plane_sweep`, but the L standard deviations alone: (B, L, h, w)."""
-    return _sweep(luma, offsets, levels, window, _room(luma, levels.count, window) if out is None else out)
+    return sparse_sweep(luma, offsets, levels, (), window, out)
 
 
-def _room(luma: Tensor, channels: int, window: Window) -> Tensor:
-    return torch.empty((luma.shape[1], channels, *window.shape), device=luma.device, memory_format=torch.channels_last)
-
-
-def _sweep(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> Tensor:
-    """Into `out`, which has channels for means and deviations or for deviations alone."""
+def sparse_sweep(
+    luma: Tensor, offsets: Tensor, levels: Levels, kept: Sequence[int], window: Window, out: Tensor | None = None
+) -> Tensor:
+    """As `plane_sweep`, but with the means of the K levels in `kept`, ascending, alone: (B, K + L, h, w)."""
+    if out is None:
+        shape = (luma.shape[1], len(kept) + levels.count, *window.shape)
+        out = torch.empty(shape, device=luma.device, memory_format=torch.channels_last)
     if kernels.can_sweep(luma, out):
-        _sweep_compiled(luma, offsets, levels, window, out)
+        _sweep_compiled(luma, offsets, levels, kept, window, out)
     else:
-        _sweep_by_torch(luma, offsets, levels, window, out)
+        _sweep_by_torch(luma, offsets, levels, kept, window, out)
     return out
 
 
-def _sweep_compiled(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> None:
-    """`_sweep` by the compiled kernel."""
+def _sweep_compiled(luma: Tensor, offsets: Tensor, levels: Levels, kept: Sequence[int], window: Window, out: Tensor) -> None:
+    """`sparse_sweep` by the compiled kernel."""
     shifts = levels.values().double()[None, :, None] * offsets.double()[:, None]  # (N, L, 2), along x and y
     whole = shifts.floor()
     height, width = luma.shape[-2:]
     last = torch.tensor([width - 1, height - 1], dtype=torch.float64) - shifts
     valid = torch.stack(((-shifts).ceil(), last.floor() + 1), -1)
-    kernels.plane_sweep(luma, whole, cubic_taps(shifts - whole), valid, (window.top, window.left), out)
+    means = torch.tensor(kept, dtype=torch.int32)
+    kernels.plane_sweep(luma, whole, cubic_taps(shifts - whole), valid, means, (window.top, window.left), out)
 
 
-def _sweep_by_torch(luma: Tensor, offsets: Tensor, levels: Levels, window: Window, out: Tensor) -> None:
-    """`_sweep` by operations of torch."""
-    *means, deviations = out.split(levels.count, 1)
+def _sweep_by_torch(luma: Tensor, offsets: Tensor, levels: Levels, kept: Sequence[int], window: Window, out: Tensor) -> None:
+    """`sparse_sweep` by operations of torch."""
+    means, deviations = out.split((len(kept), levels.count), 1)
     values = levels.values().double()
     for first in range(0, levels.count, _BLOCK_LEVELS):
         chosen = slice(first, first + _BLOCK_LEVELS)
+        of_block = [(place, level - first) for place, level in enumerate(kept) if first <= level < chosen.stop]
         shifts = [(values[chosen] * across, values[chosen] * down) for across, down in offsets.tolist()]
         taps = {part: _level_taps(values[chosen] * part, luma.device) for part in set(offsets.flatten().tolist())}
         for block, whole in _blocks(window, _valid_for_all(shifts, window, luma.shape[-2:]), shifts[0][0].numel()):
@@ -126,8 +129,8 @@ def _sweep_by_torch(luma: Tensor, offsets: Tensor, levels: Levels, window: Windo
             mean, deviation = mean_and_deviation(shifted, counted)
             rows = slice(block.top - window.top, block.bottom - window.top)
             columns = slice(block.left - window.left, block.right - window.left)
-            for place in means:
-                place[:, chosen, rows, columns] = mean
+            for place, level in of_block:
+                means[:, place, rows, columns] = mean[:, level]
             deviations[:, chosen, rows, columns] = deviation
 
 

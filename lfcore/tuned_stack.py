@@ -12,12 +12,13 @@ from torch import Tensor, nn
 from lfcore.fourier import LEAST_CHANNELS, FourierConvolution, unchecked
 from lfcore.layers import DirectConvolution, Way, make_layer
 from lfcore.networks import BORDER, PaperStack
-from lfcore.planesweep import Window
+from lfcore.planesweep import Levels, Window
 
 # Features of one tile take (2 L) values a pixel: so many pixels in bfloat16 are 23 MB.
 TILE_PIXELS = 200 * 288
 HiddenLayer = Callable[[Tensor, Callable[[], None]], Tensor]  # of a picture, and what is called now and then
 _FEW_CHANNELS = 32  # in: of so few, the matrix unit computes large kernels directly in half of Fourier transforms' time
+_FEW_MEANS = 12  # with the deviations of 100 levels seven sixteens of channels, as Fourier transforms take them at once
 _STEP = 16  # widths that are multiples of it suit the blocks in which convolutions are computed
 
 
@@ -33,11 +34,12 @@ class Tuning:
     # Whether Fourier transforms (lfcore.fourier) are the way of larger kernels than 3 x 3, and of those where `way` is torch's.
     # Large kernels of few channels are the matrix unit's where it is `way`.
     fourier: bool = False
+    means: int = Levels().count  # of the plane sweep's levels, those whose means are computed (lfcore.fewer_means)
 
     @classmethod
     def by_fourier(cls, dtype: torch.dtype, way: Way = Way.TORCH) -> Tuning:
-        """With Fourier transforms: in tiles that are larger, since the transforms' own have overlaps already."""
-        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, way, fourier=True)
+        """With Fourier transforms, few means, and larger tiles, since the transforms' own have overlaps already."""
+        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, way, fourier=True, means=_FEW_MEANS)
 
     def tiles(self, height: int, width: int) -> Iterator[Tile]:
         """Cover a picture with tiles of about equal size, from the top left."""

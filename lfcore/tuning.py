@@ -27,6 +27,7 @@ from lfcore.errors import OutputError
 from lfcore.kernels import compiled
 from lfcore.layers import DirectConvolution, Layer, Way, make_layer
 from lfcore.networks import BORDER, PaperStack
+from lfcore.planesweep import Levels
 from lfcore.tuned_stack import TunedStack, Tuning
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
@@ -140,7 +141,7 @@ def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> tuple[d
 def _probe(tuning: Tuning) -> Callable[[], float]:
     """Times a strip of the disparity network: seconds a pixel."""
     with torch.random.fork_rng(devices=[]):  # its random weights must not shift anybody's sequence
-        stack = TunedStack(PaperStack(200, 1), tuning)
+        stack = TunedStack(PaperStack(tuning.means + Levels().count, 1), tuning)
     rows = _FOURIER_ROWS if tuning.fourier else max(8, 2 * torch.get_num_threads())  # the threads share out rows
     x = stack.empty_input(rows + 2 * BORDER, tuning.tile_width + 2 * BORDER).zero_()
 

@@ -13,6 +13,7 @@ from lfcore.lightfield import LightField
 from lfcore.metrics import k16, k16_view, psnr
 from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel
+from lfcore.planesweep import Levels
 from lfcore.synthesizer import MODEL_NAMES, MeanSynthesizer, Synthesizer, corner_tensor, make_synthesizer, reference_synthesis
 from lfcore.tuned_stack import Tuning
 from lfcore.weights import Weights, load_weights
@@ -66,6 +67,20 @@ def test_fourier_transforms_in_bfloat16_cost_no_more_than_that_either(weights: W
     exact = score(NetworkSynthesizer(weights.model, "float32", Tuning()), field)
     short = score(NetworkSynthesizer(weights.model, "by Fourier", Tuning.by_fourier(torch.bfloat16)), field)
     assert abs(exact - short) <= 0.05
+
+
+@pytest.mark.parametrize("path", SCENES)
+@pytest.mark.parametrize("at", [(0, 0), (1, 1), (2, 1)])
+def test_few_means_cost_less_than_a_fiftieth_of_a_decibel(weights: Weights, path: Path, at: tuple[int, int]) -> None:
+    """At a captured corner, in the middle, and at an edge of the grid."""
+    field = open_light_field(path)
+    row, column = ((size - 1) * part // 2 for size, part in zip((field.rows, field.columns), at, strict=True))
+    scores = []
+    for means in (Levels().count, Tuning.by_fourier(torch.float32).means):
+        synthesizer = NetworkSynthesizer(weights.model, "means", dataclasses.replace(Tuning(), means=means))
+        synthesizer.set_light_field(field)
+        scores.append(k16(synthesizer.synthesize(*field.position(row, column)).image, field.view(row, column)).psnr)
+    assert scores[1] == pytest.approx(scores[0], abs=0.02)
 
 
 @pytest.mark.parametrize("path", SCENES)

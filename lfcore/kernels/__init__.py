@@ -62,25 +62,26 @@ def can_sweep(luma: Tensor, out: Tensor) -> bool:
     )
 
 
-def plane_sweep(luma: Tensor, whole: Tensor, taps: Tensor, valid: Tensor, corner: tuple[int, int], out: Tensor) -> None:
-    """Mean and deviation, or the deviation alone, at each of L levels over the N inputs (N, B, H, W) that count there.
+def plane_sweep(
+    luma: Tensor, whole: Tensor, taps: Tensor, valid: Tensor, kept: Tensor, corner: tuple[int, int], out: Tensor
+) -> None:
+    """Means at some of L levels and deviations at all, over the N inputs (N, B, H, W) that count there.
 
     whole: (N, L, 2), whole pixels of the shift of each input and level along x and y. taps: (N, L, 2, 4), the weights of the
     samples at -1, 0, 1, 2 past it; samples beyond an edge repeat it. valid: (N, L, 2, 2), of the novel view's columns and rows
-    the first that counts and the one past the last. corner: (top, left), the place in the novel view of the first pixel
-    of `out`, (B, 2 L, h, w), channels side by side: the L means, then the L deviations; or (B, L, h, w), the deviations.
-    Arguments as `can_sweep` wants them.
+    the first that counts and the one past the last. kept: (K,), ascending, the levels whose means are wanted. corner:
+    (top, left), the place in the novel view of the first pixel of `out`, (B, K + L, h, w), channels side by side: these means,
+    then the deviations. Arguments as `can_sweep` wants them.
     """
     assert _KERNELS is not None
     luma, taps = luma.contiguous(), taps.float().contiguous()
-    whole, valid = whole.int().contiguous(), valid.int().contiguous()
+    whole, valid, kept = whole.int().contiguous(), valid.int().contiguous(), kept.int().contiguous()
     inputs, batch, height, width = luma.shape
-    levels, (channels, rows, columns) = whole.shape[1], out.shape[1:]
-    assert channels in (levels, 2 * levels)
+    levels, means, (channels, rows, columns) = whole.shape[1], len(kept), out.shape[1:]
     assert whole.shape == (inputs, levels, 2) and taps.shape == (inputs, levels, 2, 4) and valid.shape == (inputs, levels, 2, 2)
-    assert out.shape[0] == batch
-    tables = (luma.data_ptr(), whole.data_ptr(), taps.data_ptr(), valid.data_ptr(), out.data_ptr())
-    sizes = (inputs, batch, height, width, levels, channels, *corner, rows, columns)
+    assert out.shape[0] == batch and channels == means + levels
+    tables = (luma.data_ptr(), whole.data_ptr(), taps.data_ptr(), valid.data_ptr(), kept.data_ptr(), out.data_ptr())
+    sizes = (inputs, batch, height, width, levels, means, *corner, rows, columns)
     layout = (out.stride(0), out.stride(2), out.stride(3), out.dtype == torch.bfloat16)
     _KERNELS.plane_sweep(*tables, *sizes, *layout, torch.get_num_threads())
 

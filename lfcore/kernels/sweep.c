@@ -8,8 +8,9 @@ typedef struct {
     const int32_t *whole; /* (inputs, levels, 2): whole pixels of each shift along x and y */
     const float *taps; /* (inputs, levels, 2, 4): weights of the samples at -1, 0, 1, 2 past it */
     const int32_t *valid; /* (inputs, levels, 2, 2): along x and y the first place that counts, and the one past the last */
-    void *out; /* (batch, rows, columns, channels), the last contiguous: means, then deviations of the levels, or these alone */
-    Py_ssize_t inputs, batch, height, width, levels, channels, top, left, columns;
+    const int32_t *kept; /* (means), ascending: the levels whose means are put out */
+    void *out; /* (batch, rows, columns, means + levels), the last contiguous: these means, then the deviations of all levels */
+    Py_ssize_t inputs, batch, height, width, levels, means, top, left, columns;
     Py_ssize_t out_batch, out_row, out_pixel; /* strides in values */
     int halved; /* whether `out` is bfloat16, not float32 */
 } Sweep;
@@ -186,8 +187,8 @@ PART void write_pixels(const float *rows, Py_ssize_t channels, Py_ssize_t w, int
 /* Rows `begin` to `end` of the window; 0, or -1 where there is no memory. */
 MANY_PROCESSORS
 static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
-    const Py_ssize_t w = sweep->columns, channels = sweep->channels, of_row = row_room(w);
-    const Py_ssize_t room_floats = (w + 3) + 2 * w + sweep->inputs * w, means = channels - sweep->levels;
+    const Py_ssize_t w = sweep->columns, means = sweep->means, channels = means + sweep->levels, of_row = row_room(w);
+    const Py_ssize_t room_floats = (w + 3) + 2 * w + sweep->inputs * w;
     float *memory = malloc((room_floats + at_least(channels, 16) * of_row) * sizeof(float));
     Span *spans = malloc(sweep->inputs * sizeof(Span));
     if (memory == NULL || spans == NULL) {
@@ -199,9 +200,13 @@ static int sweep_rows(const Sweep *sweep, Py_ssize_t begin, Py_ssize_t end) {
     const Room room = {memory, memory + w + 3, memory + w + 3 + w, memory + w + 3 + 2 * w, spans};
     for (Py_ssize_t k = 0; k < sweep->batch; ++k)
         for (Py_ssize_t y = begin; y < end; ++y) {
-            for (Py_ssize_t level = 0; level < sweep->levels; ++level)
-                level_row(sweep, k, level, sweep->top + y, &room, means ? rows + level * of_row : room.mean,
+            Py_ssize_t put_out = 0; /* of the means */
+            for (Py_ssize_t level = 0; level < sweep->levels; ++level) {
+                const int keeps = put_out < means && sweep->kept[put_out] == level;
+                level_row(sweep, k, level, sweep->top + y, &room, keeps ? rows + put_out * of_row : room.mean,
                           rows + (means + level) * of_row);
+                put_out += keeps;
+            }
             const Py_ssize_t size = sweep->halved ? 2 : 4, place = k * sweep->out_batch + y * sweep->out_row;
             write_pixels(rows, channels, w, sweep->halved, (char *)sweep->out + place * size, sweep->out_pixel * size);
         }
@@ -223,17 +228,18 @@ static int sweep_all(const Sweep *sweep, Py_ssize_t rows, int threads) {
 
 PyObject *plane_sweep(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Sweep sweep;
-    unsigned long long luma, whole, taps, valid, out;
+    unsigned long long luma, whole, taps, valid, kept, out;
     Py_ssize_t rows;
     int threads;
-    if (!PyArg_ParseTuple(arguments, "KKKKKnnnnnnnnnnnnnpi", &luma, &whole, &taps, &valid, &out, &sweep.inputs, &sweep.batch,
-                          &sweep.height, &sweep.width, &sweep.levels, &sweep.channels, &sweep.top, &sweep.left, &rows, &sweep.columns,
+    if (!PyArg_ParseTuple(arguments, "KKKKKKnnnnnnnnnnnnnpi", &luma, &whole, &taps, &valid, &kept, &out, &sweep.inputs, &sweep.batch,
+                          &sweep.height, &sweep.width, &sweep.levels, &sweep.means, &sweep.top, &sweep.left, &rows, &sweep.columns,
                           &sweep.out_batch, &sweep.out_row, &sweep.out_pixel, &sweep.halved, &threads))
         return NULL;
     sweep.luma = at_address(luma);
     sweep.whole = at_address(whole);
     sweep.taps = at_address(taps);
     sweep.valid = at_address(valid);
+    sweep.kept = at_address(kept);
     sweep.out = at_address(out);
     int failed;
     Py_BEGIN_ALLOW_THREADS
