@@ -1,8 +1,9 @@
 """What the window costs while a person uses it, on a virtual screen with Mesa's software renderer.
 
 `python -m tests.measure_window LIGHT_FIELD ANOTHER` (folders of views): seconds from start to the first picture and to the
-finished one that lies on disk, and from the end of a drag to the finished picture; then the times of frames while another
-light field is opened, the cache fills, and a sweep is exported.
+finished one that lies on disk, and from the end of a drag to the finished picture, by the program's own frames, since
+looking at the screen takes a part of what the networks need; then the times of frames while another light field is opened, the
+cache fills, and a sweep is exported.
 """
 
 from __future__ import annotations
@@ -14,22 +15,24 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from app.opening import SHIPPED
+from app.state import Step
 from tests.virtual_screen import VirtualScreen, virtual_screen, wait_until
 
 STARTS = 4
 RESTS = 12
-UNSEEN = 0.35  # s after a drag in which the screen is left alone
+UNTIL_NEXT = 2.0  # s from one drag to the next
 TOO_LONG = 0.05  # s, of a frame
 PICTURE = (slice(100, 600), slice(100, 800))  # rows and columns of the screen that lie on the picture
 DOT = (784, slice(12, 22))  # of the step in the status line
 COLOUR_OF_FULL = (108, 182, 232)
 
-# The program, which writes when each frame ended and how long it took.
+# The program, which writes when each frame ended, how long it took, which step was on screen and how far it had been faded in.
 PROGRAM = """
 import sys, time
 from pathlib import Path
@@ -39,7 +42,8 @@ frames = open(sys.argv[2], "w", buffering=1)
 def timed(window):
     start = time.monotonic()
     draw(window)
-    print(time.monotonic(), time.monotonic() - start, file=frames)
+    end, controller = time.monotonic(), window._at_hand.controller
+    print(end, end - start, controller.step.value, controller.share, file=frames)
 app.viewer._Window.draw = timed
 if __name__ == "__main__":
     app.viewer.run_viewer(Path(sys.argv[1]))
@@ -71,21 +75,44 @@ def measure_start(screen: VirtualScreen, path: Path, frames: Path) -> None:
 
 
 def measure_rest(screen: VirtualScreen, path: Path, frames: Path) -> None:
-    """How long a hand that comes to rest at a viewpoint nobody has seen waits for the picture of `full`, its fade included."""
-    seconds = []
+    """How long a hand that comes to rest at a viewpoint nobody has seen waits for the first frame with the picture of `full`,
+    and for the one in which it has been faded in."""
+    moved = []
     with screen.program(PROGRAM, str(path), str(frames)):
         wait_until(lambda: _is_full(screen), "the picture of full")
         time.sleep(5)  # the networks may still be on their way
         screen.xdotool("mousemove", 400, 300, "mousedown", 1)
         for drag in range(1, RESTS + 1):
+            moved.append(time.monotonic())
             screen.xdotool("mousemove", 400 + 23 * drag, 300 + 17 * (drag % 5))
-            moved = time.monotonic()
-            time.sleep(UNSEEN)  # looking takes a part of what the networks need
-            assert not _is_full(screen), "the screen was not looked at early enough"
-            seconds.append(_seconds_until(lambda: _is_full(screen), moved))
-            time.sleep(1)
+            time.sleep(UNTIL_NEXT)
         screen.xdotool("mouseup", 1)
-    print(f"full after the hand came to rest: {min(seconds):.2f} to {max(seconds):.2f} s, median {np.median(seconds):.2f}")
+    drawn = [_Frame.of(line) for line in frames.read_text().splitlines()]
+    for name, least in (("on screen", 0.0), ("faded in", 1.0)):
+        seconds = [_full_again(drawn, start, least) - start for start in moved]
+        print(f"full {name} after the hand came to rest: {min(seconds):.2f} to {max(seconds):.2f} s", end=", ")
+        print(f"median {np.median(seconds):.2f}")
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """A line of what the program writes."""
+
+    end: float
+    seconds: float
+    full: bool
+    share: float
+
+    @classmethod
+    def of(cls, line: str) -> _Frame:
+        end, seconds, step, share = line.split()
+        return cls(float(end), float(seconds), step == Step.FULL.value, float(share))
+
+
+def _full_again(frames: list[_Frame], start: float, share: float) -> float:
+    """When the first frame after `start` ended that has the picture of `full`, so far faded in, after one that has not."""
+    later = itertools.dropwhile(lambda frame: frame.end < start or frame.full, frames)
+    return next(frame.end for frame in later if frame.full and frame.share >= share)
 
 
 def measure_frames(screen: VirtualScreen, path: Path, another: Path, frames: Path, folder: Path) -> None:
@@ -118,9 +145,9 @@ def measure_frames(screen: VirtualScreen, path: Path, another: Path, frames: Pat
         mark("end", 0)
         screen.xdotool("key", "ctrl+q")
         program.wait(30)
-    times = np.loadtxt(frames)  # (N, 2)
+    drawn = [_Frame.of(line) for line in frames.read_text().splitlines()]
     for (name, begin), (_, end) in itertools.pairwise(marks):
-        of_part = 1e3 * times[(times[:, 0] >= begin) & (times[:, 0] < end), 1]
+        of_part = 1e3 * np.array([frame.seconds for frame in drawn if begin <= frame.end < end])
         if not of_part.size:
             print(f"{name}: nothing was drawn")
             continue

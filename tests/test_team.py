@@ -15,7 +15,8 @@ from scenes import plane
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
 from lfcore.metrics import to_uint8
-from lfcore.weights import load_weights
+from lfcore.networks import SingleModel, initialise
+from lfcore.weights import load_weights, save_weights
 
 ROOT = Path(__file__).parents[1]
 
@@ -33,11 +34,15 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_views(plane(3.0, (3, 3), (120, 124)), tmp_path_factory.mktemp("data") / "plane")
 
 
-def train(scene: Path, out: Path, processes: int, steps: int = 3, batch: int = 8) -> subprocess.CompletedProcess[str]:
+def train(
+    scene: Path, out: Path, processes: int, steps: int = 3, batch: int = 8, model: str = "realtime", more: str = ""
+) -> subprocess.CompletedProcess[str]:
     launcher = [sys.executable]
     if processes > 1:
         launcher += ["-m", "torch.distributed.run", "--standalone", f"--nproc-per-node={processes}"]
-    options = f"--model realtime --steps {steps} --batch {batch} --patch 32 --matching 0 --device cpu --threads 1 --lr 1e-3"
+    options = (
+        f"--model {model} --steps {steps} --batch {batch} --patch 32 --matching 0 --device cpu --threads 1 --lr 1e-3 {more}"
+    )
     command = [*launcher, "-m", "app", "train", "--data", str(scene), "--val", str(scene), "--out", str(out), *options.split()]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=240)
@@ -56,6 +61,24 @@ def test_two_processes_learn_what_one_learns(scene: Path, tmp_path: Path) -> Non
             assert json.loads(file.metadata()["run"])["step"] == 3
     moved = max(float(v.abs().max()) for v in results[1].values())
     assert np.isfinite(moved)
+    for name, value in results[1].items():
+        torch.testing.assert_close(results[2][name], value, atol=2e-3, rtol=1e-3, msg=lambda m, n=name: f"{n}: {m}")
+
+
+def test_two_processes_give_dead_channels_the_same_new_weights(scene: Path, tmp_path: Path) -> None:
+    initial = tmp_path / "initial.safetensors"
+    model = SingleModel()
+    initialise(model, 1)
+    save_weights(initial, model, {})
+    results, more = {}, f"--init {initial} --decay 0"
+    for processes in (1, 2):
+        out = tmp_path / f"{processes}.safetensors"
+        done = train(scene, out, processes, steps=1, model="single", more=more)
+        assert done.returncode == 0, done.stderr[-2000:]
+        assert done.stdout.count("dead channels given new weights") == 1
+        results[processes] = load_weights(out).model.state_dict()
+    changed = [name for name, value in model.state_dict().items() if (results[1][name] - value).abs().max() > 0.05]
+    assert len(changed) >= 2
     for name, value in results[1].items():
         torch.testing.assert_close(results[2][name], value, atol=2e-3, rtol=1e-3, msg=lambda m, n=name: f"{n}: {m}")
 

@@ -222,7 +222,9 @@ def test_the_margin_holds_every_sample_of_the_sweep() -> None:
 
 
 def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None, model: str = "full") -> list[Progress]:
-    config = TrainConfig(model=model, steps=steps, decay_share=0, loss=LossConfig(matching_steps=3), patches=SMALL)
+    config = TrainConfig(
+        model=model, steps=steps, decay_share=0, loss=LossConfig(matching_steps=3), patches=SMALL, revival_steps=2
+    )
     reports: list[Progress] = []
     train(
         config,
@@ -239,11 +241,14 @@ def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None
 
 @pytest.mark.parametrize("model", TRAINABLE)
 def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path, model: str) -> None:
-    train_small(tmp_path, 5, "straight", model=model)
+    whole = train_small(tmp_path, 5, "straight", model=model)
     first = train_small(tmp_path, 5, "halved", stop_at=2, model=model)
     second = train_small(tmp_path, 5, "halved", model=model)
     assert [p.step for p in first] == [1, 2]
     assert [p.step for p in second] == [3, 4, 5]
+    # Channels that were dead from the beginning have been given new weights before it was stopped, and after.
+    assert [p.revived for p in first + second] == [p.revived for p in whole]
+    assert (whole[2].revived > 0) == (model != "realtime") and whole[0].revived == whole[1].revived == 0
     straight = load_weights(tmp_path / "straight.safetensors").model.state_dict()
     halved = load_weights(tmp_path / "halved.safetensors").model.state_dict()
     last = [load_checkpoint_tensors(tmp_path / run) for run in ("straight", "halved")]
@@ -255,7 +260,9 @@ def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path, model: str) 
 def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None:
     train_small(tmp_path, 1, "first")
     given = load_weights(tmp_path / "first.safetensors")
-    config = TrainConfig(steps=1, learning_rate=1e-9, warm_up_steps=0, loss=LossConfig(matching_steps=0), patches=SMALL)
+    config = TrainConfig(
+        steps=1, learning_rate=1e-9, warm_up_steps=0, loss=LossConfig(matching_steps=0), patches=SMALL, revival_steps=0
+    )
     out, run = tmp_path / "second.safetensors", tmp_path / "second"
     scenes = [plane(2.0, (3, 3), (120, 120))]
     train(config, Runtime(device="cpu"), scenes, [], out, run, lambda p: None, lambda: False, given)

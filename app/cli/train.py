@@ -81,6 +81,13 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument(
         "--matching-weight", type=positive, metavar="W", default=0.03, help="how much that counts at first (default: 0.03)"
     )
+    parser.add_argument(
+        "--revival",
+        type=int,
+        metavar="N",
+        default=500,
+        help="steps after which dead channels get new weights, while the rate is high; 0: never (500)",
+    )
     parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
     parser.add_argument(
         "--generated", type=int, metavar="N", default=0, help="generated scenes to train on beside the data (default: 0)"
@@ -181,6 +188,7 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         generated_share=options.generated_share,
         patches=patches,
         model=options.model,
+        revival_steps=options.revival,
     )
 
 
@@ -253,6 +261,9 @@ class _Reporter:
             self.finish()
             scores = ", ".join(f"{name} {psnr:.2f} dB" for name, psnr in validation.scores.items())
             print(f"step {progress.step}: loss {progress.loss:.6f}" + (f", {scores}" if scores else ""), flush=True)
+        if progress.revived:
+            self.finish()
+            print(f"step {progress.step}: {progress.revived} dead channels given new weights", flush=True)
         if self._terminal:
             rate = max(progress.steps_per_second, 1e-9)
             label = f"training, loss {progress.loss:.5f}"

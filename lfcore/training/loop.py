@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import nn
 
 from lfcore.allocator import keep_freed_memory
 from lfcore.compact import CompactModel
@@ -34,9 +35,14 @@ from lfcore.training.loss import LossConfig, StepLoss
 from lfcore.training.optimiser import MuonAdam
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, mixed, sample_group
 from lfcore.training.plot import plot
+from lfcore.training.revival import Part, Surroundings, revive
 from lfcore.training.team import ALONE, Team
 from lfcore.tuning import machine_tuning
 from lfcore.weights import Weights, save_weights
+
+# Patches are looked at for dead channels in so many groups; the other number keeps their seeds apart from those of steps.
+_REVIVAL_GROUPS = 24
+_REVIVAL = 1000
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,7 @@ class TrainConfig:
     generated_share: float = 0.5  # of the patches, where there are generated scenes
     patches: PatchConfig = field(default_factory=PatchConfig)
     model: str = "full"
+    revival_steps: int = 500  # after so many, and before given weights' first, dead channels get new ones; 0: never
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,7 @@ class Progress:
     loss: float  # mean squared error of the last patches, running average
     steps_per_second: float
     validation: CurvePoint | None  # when one has just been made
+    revived: int  # channels that have been given new weights before this step
 
 
 def prepare_scene(light_field: LightField) -> TrainingScene:
@@ -136,6 +144,7 @@ def train(
         upcoming = pool.submit(trainer.draw, prepared, trainer.step)
         while trainer.step < config.steps:
             groups = upcoming.result()
+            revived = trainer.revive(prepared) if revival_due(config, trainer.step) else 0
             upcoming = pool.submit(trainer.draw, prepared, trainer.step + 1)
             loss = trainer.take_step(groups)
             running = loss if math.isnan(running) else 0.98 * running + 0.02 * loss
@@ -149,7 +158,7 @@ def train(
                 last_validation = time.monotonic()
             rate = (trainer.step - first_step) / max(now - began, 1e-9)
             if team.leads:
-                report(Progress(trainer.step, config.steps, running, rate, point))
+                report(Progress(trainer.step, config.steps, running, rate, point, revived))
             if ending:
                 team.wait()  # until the weights are written
                 return
@@ -216,6 +225,30 @@ class Trainer:
         mine = range(self._team.rank, patches.batch // patches.group, self._team.size)
         generators = [np.random.default_rng((self._config.seed, step, index)) for index in mine]
         return [sample_group(scenes, patches, self.levels, rng) for rng in generators]
+
+    def revive(self, scenes: Sequence[TrainingScene]) -> int:
+        """Give channels that are never positive in the patches of some steps new weights; returns how many there were.
+
+        The patches depend on the seed and the step alone, and every process of a team takes the same.
+        """
+        patches = self._config.patches
+        seeds = [(self._config.seed, self.step, _REVIVAL, index) for index in range(_REVIVAL_GROUPS)]
+
+        def show() -> None:
+            for seed in seeds:
+                group = sample_group(scenes, patches, self.levels, np.random.default_rng(seed))
+                self._loss(Batch.of([group], self._device), self.step)
+
+        averages = dict(zip(self._model.parameters(), self._average.parameters(), strict=True))
+
+        def forget(parameter: nn.Parameter, part: Part) -> None:
+            averages[parameter][part] = parameter[part]
+            for moment in self._optimiser.state.get(parameter, {}).values():
+                if moment.shape == parameter.shape:
+                    moment[part] = 0
+
+        generator = torch.Generator().manual_seed(int(np.random.default_rng(seeds[0]).integers(2**62)))
+        return revive(self._model, Surroundings(show, forget, self._team.agree, generator))
 
     @property
     def levels(self) -> Levels:
@@ -295,6 +328,14 @@ class Trainer:
                 name: value if name == "step" else torch.empty_like(parameter).copy_(value)
                 for name, value in state.items()
             }
+
+
+def revival_due(config: TrainConfig, step: int) -> bool:
+    """Whether dead channels are looked for before this step: not in the last half of the falling rate, for what is revived must
+    have time to learn."""
+    if config.revival_steps <= 0 or (step == 0 and not config.initial):
+        return False
+    return step % config.revival_steps == 0 and step <= config.steps * (1 - config.decay_share / 2)
 
 
 def learning_rate(config: TrainConfig, step: int) -> float:

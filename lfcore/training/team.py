@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import torch
 import torch.distributed as dist
-from torch import nn
+from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 
@@ -36,6 +36,13 @@ class Team:
         flags = torch.tensor(float(flag), device="cuda" if dist.get_backend() == "nccl" else "cpu")
         dist.all_reduce(flags, dist.ReduceOp.MAX)
         return bool(flags)
+
+    def agree(self, tensor: Tensor) -> Tensor:
+        """The first process's tensor, in all of them; all must ask at the same step."""
+        if self.size > 1:
+            tensor = tensor.contiguous()
+            dist.broadcast(tensor, 0)
+        return tensor
 
     def wait(self) -> None:
         """Until all have come here."""
