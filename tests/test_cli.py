@@ -306,7 +306,7 @@ def test_train_hands_its_options_to_the_loop(
         assert [light_field.name for light_field in scenes] == ["a scene é"]
         assert validation == []
         assert run_dir.is_dir()
-        report(loop.Progress(1, 5, 0.25, 2.0, None))
+        report(loop.Progress(1, 5, 0.25, 2.0, None, 0))
         assert not stopped()
         signal.raise_signal(signal.SIGINT)
         assert stopped()
