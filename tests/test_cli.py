@@ -310,7 +310,7 @@ def test_train_hands_its_options_to_the_loop(
         assert not stopped()
         signal.raise_signal(signal.SIGINT)
         assert stopped()
-        report(loop.Progress(2, 5, 0.125, 2.0, CurvePoint(2, 1.0, 1e-4, 0.125, {"held": 30.5})))
+        report(loop.Progress(2, 5, 0.125, 2.0, CurvePoint(2, 1.0, 1e-4, 0.125, {"held": 30.5}), 3))
 
     monkeypatch.setattr(loop, "train", train)
     out = tmp_path / "w.safetensors"
@@ -329,6 +329,8 @@ def test_train_hands_its_options_to_the_loop(
         "3",
         "--minutes",
         "1.5",
+        "--revival",
+        "7",
     ]
     options += ["--generated", "1"]
     before = signal.getsignal(signal.SIGINT)
@@ -336,13 +338,17 @@ def test_train_hands_its_options_to_the_loop(
     assert signal.getsignal(signal.SIGINT) is before
     config, runtime = seen["config"], seen["runtime"]
     assert isinstance(config, loop.TrainConfig)
-    assert (config.steps, config.learning_rate, config.seed) == (5, 0.002, 3)
+    assert (config.steps, config.learning_rate, config.seed, config.revival_steps) == (5, 0.002, 3, 7)
     assert (config.patches.size, config.patches.batch, config.patches.group) == (40, 6, 3)
     assert isinstance(runtime, loop.Runtime)
     assert (runtime.device, runtime.stop_after_minutes) == ("cpu", 1.5)
     assert (seen["out"], seen["run_dir"]) == (out, tmp_path / "w")
     output = capsys.readouterr()
-    assert output.out.splitlines() == ["step 1 of 5: loss 0.250000, 0:02 left", "step 2: loss 0.125000, held 30.50 dB"]
+    assert output.out.splitlines() == [
+        "step 1 of 5: loss 0.250000, 0:02 left",
+        "before step 2: 3 dead channels given new weights",
+        "step 2: loss 0.125000, held 30.50 dB",
+    ]
     assert "goes on from" in output.err
 
 

@@ -256,14 +256,14 @@ class _Reporter:
     def __call__(self, progress: Progress) -> None:
         """Take one report of the training loop."""
         now = time.monotonic()
+        if progress.revived:
+            self.finish()
+            print(f"before step {progress.step}: {progress.revived} dead channels given new weights", flush=True)
         validation = progress.validation
         if validation is not None:
             self.finish()
             scores = ", ".join(f"{name} {psnr:.2f} dB" for name, psnr in validation.scores.items())
             print(f"step {progress.step}: loss {progress.loss:.6f}" + (f", {scores}" if scores else ""), flush=True)
-        if progress.revived:
-            self.finish()
-            print(f"step {progress.step}: {progress.revived} dead channels given new weights", flush=True)
         if self._terminal:
             rate = max(progress.steps_per_second, 1e-9)
             label = f"training, loss {progress.loss:.5f}"
