@@ -84,6 +84,23 @@ def test_few_means_cost_less_than_a_fiftieth_of_a_decibel(weights: Weights, path
 
 
 @pytest.mark.parametrize("path", SCENES)
+@pytest.mark.parametrize("at", [(0, 1), (1, 1)])
+def test_few_means_cost_no_more_along_the_edges_of_the_picture(weights: Weights, path: Path, at: tuple[int, int]) -> None:
+    """There the inputs that count change from level to level, and a mean with them, which no mixture follows."""
+    field = open_light_field(path)
+    row, column = ((size - 1) * part // 2 for size, part in zip((field.rows, field.columns), at, strict=True))
+    frame = np.ones((field.height, field.width), bool)
+    frame[24:-24, 24:-24] = False
+    scores = []
+    for means in (Levels().count, Tuning.by_fourier(torch.float32).means):
+        synthesizer = NetworkSynthesizer(weights.model, "means", dataclasses.replace(Tuning(), means=means))
+        synthesizer.set_light_field(field)
+        seen = synthesizer.synthesize(*field.position(row, column)).image
+        scores.append(psnr(seen[frame], field.view(row, column)[frame]))
+    assert abs(scores[0] - scores[1]) <= 0.05
+
+
+@pytest.mark.parametrize("path", SCENES)
 def test_the_small_pair_is_above_all_others_and_the_papers_pair_is_second(path: Path) -> None:
     field = open_light_field(path)
     scores = {name: score(make_synthesizer(name), field) for name in MODEL_NAMES}
