@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from lfcore.fourier import LEAST_CHANNELS, FourierConvolution, unchecked
+from lfcore.idle_channels import used_layers
 from lfcore.layers import DirectConvolution, Way, make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Levels, Window
@@ -97,20 +98,21 @@ def _spans(size: int, most: int) -> list[tuple[int, int]]:
 
 
 class TunedStack:
-    """A PaperStack for inference: its hidden layers in the tuned type, in channels_last order, their channels filled.
+    """A PaperStack for inference: its hidden layers without idle channels, in the tuned type, channels_last, and filled up.
 
     A filled channel has weights and bias of 0, so that it stays 0 and no result changes.
     """
 
     def __init__(self, stack: PaperStack, tuning: Tuning) -> None:
         self.dtype = tuning.dtype
-        convolutions = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
+        used = used_layers(stack)
+        convolutions = used.hidden
         self._channels = convolutions[0].in_channels
         least = LEAST_CHANNELS if tuning.fourier else 1
         filled = [_filled(layer, tuning.channel_multiple, least) for layer in convolutions]
         self._input_channels = filled[0].in_channels
         self._hidden = [_tuned(layer, tuning) for layer in filled]
-        self._last = stack.last
+        self._last = used.last
         self._outputs = convolutions[-1].out_channels
 
     def empty_input(self, height: int, width: int) -> Tensor:

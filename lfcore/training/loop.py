@@ -9,9 +9,10 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
 from lfcore.training.architectures import Batch, architecture
 from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lfcore.training.clearing import clear
 from lfcore.training.curve import CurvePoint, write_curve
 from lfcore.training.loss import LossConfig, StepLoss
 from lfcore.training.optimiser import MuonAdam
@@ -40,9 +42,10 @@ from lfcore.training.team import ALONE, Team
 from lfcore.tuning import machine_tuning
 from lfcore.weights import Weights, save_weights
 
-# Patches are looked at for dead channels in so many groups; the other number keeps their seeds apart from those of steps.
-_REVIVAL_GROUPS = 24
-_REVIVAL = 1000
+# So many groups of patches are looked at for dead and idle channels; the other number keeps their seeds apart from those of
+# steps.
+_LOOKED_AT = 24
+_APART = 1000
 
 
 @dataclass(frozen=True)
@@ -154,7 +157,7 @@ def train(
             point = None
             if team.leads and (ending or now - last_validation > 60 * runtime.validate_minutes):
                 point = trainer.validate(validation, running)
-                trainer.save(out, scenes, len(generated), validation)
+                trainer.save(out, scenes, prepared, len(generated), validation)
                 last_validation = time.monotonic()
             rate = (trainer.step - first_step) / max(now - began, 1e-9)
             if team.leads:
@@ -231,12 +234,9 @@ class Trainer:
 
         The patches depend on the seed and the step alone, and every process of a team takes the same.
         """
-        patches = self._config.patches
-        seeds = [(self._config.seed, self.step, _REVIVAL, index) for index in range(_REVIVAL_GROUPS)]
 
         def show() -> None:
-            for seed in seeds:
-                group = sample_group(scenes, patches, self.levels, np.random.default_rng(seed))
+            for group in self._sample(scenes, self.step):
                 self._loss(Batch.of([group], self._device), self.step)
 
         averages = dict(zip(self._model.parameters(), self._average.parameters(), strict=True))
@@ -247,8 +247,25 @@ class Trainer:
                 if moment.shape == parameter.shape:
                     moment[part] = 0
 
-        generator = torch.Generator().manual_seed(int(np.random.default_rng(seeds[0]).integers(2**62)))
+        generator = torch.Generator().manual_seed(self._config.seed + self.step)
         return revive(self._model, Surroundings(show, forget, self._team.agree, generator))
+
+    def _sample(self, scenes: Sequence[TrainingScene], step: int) -> Iterator[PatchGroup]:
+        """Groups of patches that show what channels do, the same in every process."""
+        for index in range(_LOOKED_AT):
+            rng = np.random.default_rng((self._config.seed, step, _APART, index))
+            yield sample_group(scenes, self._config.patches, self.levels, rng)
+
+    def _plain_and_cleared(self, scenes: Sequence[TrainingScene]) -> tuple[Model, int]:
+        """The averaged weights as they are used, and how many of their channels are idle and were set to 0."""
+        plain = self._architecture.plain(self._average)
+
+        def show() -> None:
+            for group in self._sample(scenes, 0):
+                batch = Batch.of([group], torch.device("cpu"))
+                self._architecture.predict(plain, batch, partial(torch.autocast, "cpu", enabled=False))
+
+        return plain, clear(plain, show)
 
     @property
     def levels(self) -> Levels:
@@ -285,19 +302,28 @@ class Trainer:
         self._curve.append(point)
         return point
 
-    def save(self, out: Path, scenes: Sequence[LightField], generated: int, validation: Sequence[LightField]) -> None:
+    def save(
+        self,
+        out: Path,
+        scenes: Sequence[LightField],
+        prepared: Sequence[TrainingScene],
+        generated: int,
+        validation: Sequence[LightField],
+    ) -> None:
         """Checkpoint, curve, and the weights if they are the best so far."""
         best = max(self._curve, key=lambda point: point.mean)
         if best is self._curve[-1] or not validation:
+            plain, idle = self._plain_and_cleared(prepared)
             training = {
                 "steps": self.step,
                 "hours": round(self._elapsed() / 3600, 3),
                 "config": asdict(self._config),
                 "scenes": sorted({scene.name for scene in scenes}),
                 "generated_scenes": generated,
+                "idle_channels": idle,
                 "k16_psnr": {name: round(value, 3) for name, value in self._curve[-1].scores.items()},
             }
-            save_weights(out, self._architecture.plain(self._average), training)
+            save_weights(out, plain, training)
         save_checkpoint(
             self._checkpoint_path,
             Checkpoint(

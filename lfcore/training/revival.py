@@ -39,13 +39,13 @@ def revive(model: Model, around: Surroundings) -> int:
     stacks = [module for module in model.modules() if isinstance(module, PaperStack)]
     if not stacks:
         return 0
-    with _inputs_of(stacks) as seen:
+    with inputs_of(stacks) as seen:
         around.show()
     return sum(_revive_stack(stack, inputs, around) for stack, inputs in zip(stacks, seen, strict=True))
 
 
 @contextmanager
-def _inputs_of(stacks: Sequence[PaperStack]) -> Iterator[list[list[Tensor]]]:
+def inputs_of(stacks: Sequence[PaperStack]) -> Iterator[list[list[Tensor]]]:
     """What each stack is given while the block runs, float32."""
     seen: list[list[Tensor]] = [[] for _ in stacks]
     hooks = [
