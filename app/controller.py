@@ -161,6 +161,7 @@ class Controller:
     def _take_over(self, now: float) -> None:
         """What the person has done, and chosen."""
         self._now = now
+        self._screen.pass_time(now)
         if self._acted:
             self._acted, self._acted_at = False, now
         if self.state.model not in ("", self._model):
@@ -179,7 +180,7 @@ class Controller:
             if not self.state.dragging:
                 self.state.hand = None
         self._shown = self.viewpoint
-        self._screen.at(now, self.viewpoint, self._resting)
+        self._screen.go_on(self.viewpoint, self._resting)
         self._compare(self.light_field)
         self.eyes.look_up(self.light_field, self.state, self._cached)
         if not self.previewing:
@@ -580,7 +581,9 @@ class Controller:
         assert self._grid is not None
         here = self.viewpoint
         captured = self._grid.position(self._grid.nearest(*here))
-        cached = min(self._cached, key=lambda point: math.dist(point, here), default=captured)
+        # Not to what has just been made for this very place: it would be on screen at once, in the middle of its fade.
+        others = (point for point in self._cached if point != rounded(*here))
+        cached = min(others, key=lambda point: math.dist(point, here), default=captured)
         for magnet in (captured, cached):
             if math.dist(magnet, here) <= MAGNET_RADIUS:
                 if magnet != here:

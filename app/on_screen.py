@@ -37,9 +37,12 @@ class OnScreen:
         """How far the newest synthesis has been faded in."""
         return min(max((self._now - self._fade_from) / self._fade_seconds, 0.0), 1.0)
 
-    def at(self, now: float, here: Point, resting: bool) -> None:
-        """It is `now`, in seconds: what waited for the end of a fade may follow."""
+    def pass_time(self, now: float) -> None:
+        """It is `now`, in seconds, perhaps long after the last frame: what comes from now on fades in from now on."""
         self._now = now
+
+    def go_on(self, here: Point, resting: bool) -> None:
+        """What waited for the end of a fade may follow."""
         if self._next is not None and self.share >= 1.0:
             answer, self._next = self._next, None
             self.accept(answer, here, resting)

@@ -84,7 +84,8 @@ def measure_rest(screen: VirtualScreen, path: Path, frames: Path) -> None:
         screen.xdotool("mousemove", 400, 300, "mousedown", 1)
         for drag in range(1, RESTS + 1):
             moved.append(time.monotonic())
-            screen.xdotool("mousemove", 400 + 23 * drag, 300 + 17 * (drag % 5))
+            # By uneven steps: the next of even ones has been computed ahead.
+            screen.xdotool("mousemove", 400 + 23 * drag + 5 * (drag**2 % 7), 300 + 17 * (drag % 5))
             time.sleep(UNTIL_NEXT)
         screen.xdotool("mouseup", 1)
     drawn = [_Frame.of(line) for line in frames.read_text().splitlines()]

@@ -91,6 +91,19 @@ def test_steps_go_from_blend_to_full_and_instant_carries_the_drag(program: Progr
     assert (controller.picture.synthesis.u, controller.picture.synthesis.v) == (0.3, 0.4)
 
 
+def test_a_picture_that_comes_long_after_the_last_frame_fades_in_all_the_same(program: Program) -> None:
+    """Where nothing moves, no frames are drawn while the networks work."""
+    program.open_and_fade_in("3x3")
+    controller = program.controller
+    controller.state.move_to(0.3, 0.4)
+    program.tick()
+    assert controller.step is Step.INSTANT
+    program.until(lambda: controller.step is Step.FULL, seconds=10 * FADE_SECONDS)
+    assert controller.share == 0
+    program.tick(FADE_SECONDS / 2)
+    assert controller.share == pytest.approx(0.5)
+
+
 def test_full_fades_in_when_new_and_is_there_at_once_from_the_cache(program: Program) -> None:
     program.open("3x3")
     program.until_full()
@@ -284,6 +297,21 @@ def test_a_dragged_viewpoint_rests_on_a_captured_or_cached_one_nearby(program: P
     program.tick()
     program.tick(REST_SECONDS + 0.01)
     assert controller.viewpoint == (0.71, 0.7)
+
+
+def test_a_finished_picture_fades_in_where_a_held_hand_rests(program: Program) -> None:
+    """It lies in the cache at once, under its viewpoint to a few decimals, which is no place to be pulled to."""
+    program.open_and_fade_in("3x3")
+    controller, state = program.controller, program.controller.state
+    here = (1 / 3, 0.41234567)
+    state.move_to(*here)
+    state.hand, state.dragging = here, True
+    program.tick()
+    program.until(lambda: controller.step is Step.FULL, seconds=10 * FADE_SECONDS)
+    assert controller.viewpoint == here
+    assert controller.share == 0
+    program.tick(FADE_SECONDS / 2)
+    assert controller.share == pytest.approx(0.5)
 
 
 def test_keys_may_go_where_a_magnet_would_pull(program: Program) -> None:
