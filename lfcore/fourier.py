@@ -107,10 +107,9 @@ def _products_with(matrices: Tensor, dtype: torch.dtype) -> _Products:
 class _TorchProducts:
     """See _Products."""
 
-    tiles = 96
-
     def __init__(self, matrices: Tensor, dtype: torch.dtype) -> None:
         self._matrices = matrices.to(dtype)
+        self.tiles = 191 if dtype == torch.bfloat16 else 96  # about as many bytes
 
     def room(self, tiles: int) -> Tensor:
         return torch.empty(tiles * self._matrices[:, :, 0].numel(), dtype=self._matrices.dtype)
