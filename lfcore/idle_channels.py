@@ -26,7 +26,7 @@ def used_layers(stack: PaperStack) -> UsedLayers:
     """Copies of the layers, each hidden channel of which the next one uses; of a layer that is not used at all one is left."""
     following, kept_layers = stack.last, []
     outputs = torch.arange(following.out_channels)
-    for layer in reversed([layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]):
+    for layer in reversed(stack.convolutions):
         used = following.weight[outputs].detach().abs().amax((0, 2, 3)).nonzero().flatten()
         used = used if len(used) else torch.zeros(1, dtype=torch.long)
         kept_layers.append(_part(following, outputs, used))

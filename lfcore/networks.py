@@ -41,6 +41,11 @@ class PaperStack(nn.Module):
         )
         self.last = nn.Conv2d(50, outputs, 1)
 
+    @property
+    def convolutions(self) -> list[nn.Conv2d]:
+        """The hidden layers."""
+        return [layer for layer in self.hidden if isinstance(layer, nn.Conv2d)]
+
     def forward(self, x: Tensor) -> Tensor:
         hidden = self.hidden(x)
         with torch.autocast(x.device.type, enabled=False):
@@ -118,7 +123,7 @@ def initialise(model: FullModel | SingleModel, seed: int) -> None:
 
 def _start_as_average(stack: PaperStack, first_input: int) -> None:
     with torch.no_grad():
-        layers = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
+        layers = stack.convolutions
         # Disparities are some ten times as large as colours: without this their random weights drown the average.
         layers[0].weight[:, :first_input] *= 0.1
         for layer in layers:

@@ -17,10 +17,6 @@ from lfcore.weights import load_weights
 IDLE = ([2, 77], [0, 50, 99], [49])  # channels by hidden layer
 
 
-def convolutions(stack: PaperStack) -> list[nn.Conv2d]:
-    return [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
-
-
 def widths(used: UsedLayers) -> list[int]:
     return [layer.out_channels for layer in used.hidden]
 
@@ -37,7 +33,7 @@ def patches() -> Tensor:
 
 
 def without_onward(stack: PaperStack) -> None:
-    for following, channels in zip((*convolutions(stack)[1:], stack.last), IDLE, strict=True):
+    for following, channels in zip((*stack.convolutions[1:], stack.last), IDLE, strict=True):
         following.weight[:, channels] = 0
 
 
@@ -53,7 +49,7 @@ def test_a_stack_without_its_idle_channels_is_the_same(stack: PaperStack, patche
 
 
 def test_what_only_idle_channels_take_is_idle_too(stack: PaperStack) -> None:
-    first, second, third = convolutions(stack)
+    first, second, third = stack.convolutions
     stack.last.weight[:, 7] = 0
     third.weight[torch.arange(50) != 7, 5] = 0  # the fifth channel of the second layer is for the seventh of the third alone
     second.weight[torch.arange(100) != 5, 3] = 0
@@ -77,7 +73,7 @@ def test_channels_that_are_dead_or_always_the_same_are_cleared_and_no_result_cha
     initialise(model, 5)
     x = torch.cat((patches, patches), 1)[:, :14]
     inputs = x
-    for layer in convolutions(model.colour):
+    for layer in model.colour.convolutions:
         assert layer.bias is not None
         nn.init.normal_(layer.weight, std=0.05, generator=torch.Generator().manual_seed(9))
         layer.bias -= layer(inputs).mean((0, 2, 3))
@@ -88,7 +84,7 @@ def test_channels_that_are_dead_or_always_the_same_are_cleared_and_no_result_cha
     assert clear(model, lambda: model.colour(x)) == 6
     assert widths(used_layers(model.colour)) == [98, 98, 48]
     torch.testing.assert_close(model.colour(x), before, atol=2e-3 * float(before.std()), rtol=0)
-    for layer, was, inputs_idle in zip(convolutions(model.colour), convolutions(former), (0, 2, 2), strict=True):
+    for layer, was, inputs_idle in zip(model.colour.convolutions, former.convolutions, (0, 2, 2), strict=True):
         outputs = [channel for channel in range(was.out_channels) if channel not in (10, 20)]
         taken = [c for c in range(was.in_channels) if not inputs_idle or c not in (10, 20)]
         assert torch.equal(layer.weight[outputs][:, taken], was.weight[outputs][:, taken])

@@ -20,14 +20,10 @@ def alone(show: object, told: list[tuple[nn.Parameter, Part]] | None = None) -> 
     return Surroundings(show, lambda *what: kept.append(what), lambda tensor: tensor, torch.Generator().manual_seed(4))
 
 
-def convolutions(stack: PaperStack) -> list[nn.Conv2d]:
-    return [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
-
-
 def values(stack: PaperStack, x: Tensor) -> list[Tensor]:
     """What each hidden layer puts out, rectified: (100 or 50, places) each."""
     found = []
-    for layer in convolutions(stack):
+    for layer in stack.convolutions:
         x = layer(x).relu()
         found.append(x.transpose(0, 1).flatten(1))
     return found
@@ -40,7 +36,7 @@ def model(patches: Tensor) -> SingleModel:
     initialise(made, 5)
     with torch.no_grad():
         x = patches
-        for layer, channels in zip(convolutions(made.colour), DEAD.values(), strict=True):
+        for layer, channels in zip(made.colour.convolutions, DEAD.values(), strict=True):
             assert layer.bias is not None
             nn.init.normal_(layer.weight, std=0.05, generator=torch.Generator().manual_seed(9))
             layer.bias -= layer(x).mean((0, 2, 3))  # all others are positive in half of all places
@@ -67,7 +63,7 @@ def test_dead_channels_are_positive_in_half_of_all_places_and_no_result_changes(
         assert float(sizes[channels].min()) > 0.3 * float(sizes[others].median())
         assert float(sizes[channels].max()) < 3 * float(sizes[others].median())
         # What lived has the weights that it had, but for those with which it takes what was dead.
-        kept, was = convolutions(model.colour)[index], convolutions(former.colour)[index]
+        kept, was = model.colour.convolutions[index], former.colour.convolutions[index]
         taken = [channel for channel in range(kept.in_channels) if index == 0 or channel not in DEAD[index - 1]]
         assert torch.equal(kept.weight[others][:, taken], was.weight[others][:, taken])
 
@@ -111,7 +107,7 @@ def test_a_channel_that_was_dead_learns_again(model: SingleModel, patches: Tenso
 def test_in_the_coordinates_in_which_the_first_layer_is_trained_too() -> None:
     full = FullModel()
     initialise(full, 7)
-    first = convolutions(full.disparity)[0]
+    first = full.disparity.convolutions[0]
     first.bias[[5, 50]] = -1000.0  # type: ignore[index]
     condition(full)
     features = torch.rand(2, 200, 24, 25, generator=torch.Generator().manual_seed(8))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import torch
 import torch.nn.functional as F
-from torch import Tensor, nn
+from torch import Tensor
 
 from lfcore.models import Model
 from lfcore.networks import PaperStack
@@ -34,7 +34,7 @@ def clear(model: Model, show: Callable[[], None]) -> int:
 
 
 def _clear_stack(stack: PaperStack, inputs: list[Tensor]) -> int:
-    layers = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
+    layers = stack.convolutions
     moments = []
     for layer in layers:
         inputs = [F.relu(layer(x)) for x in inputs]

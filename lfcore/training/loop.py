@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -234,11 +234,6 @@ class Trainer:
 
         The patches depend on the seed and the step alone, and every process of a team takes the same.
         """
-
-        def show() -> None:
-            for group in self._sample(scenes, self.step):
-                self._loss(Batch.of([group], self._device), self.step)
-
         averages = dict(zip(self._model.parameters(), self._average.parameters(), strict=True))
 
         def forget(parameter: nn.Parameter, part: Part) -> None:
@@ -248,24 +243,21 @@ class Trainer:
                     moment[part] = 0
 
         generator = torch.Generator().manual_seed(self._config.seed + self.step)
+        show = partial(self._show, self._model, scenes, self.step, self._device)
         return revive(self._model, Surroundings(show, forget, self._team.agree, generator))
-
-    def _sample(self, scenes: Sequence[TrainingScene], step: int) -> Iterator[PatchGroup]:
-        """Groups of patches that show what channels do, the same in every process."""
-        for index in range(_LOOKED_AT):
-            rng = np.random.default_rng((self._config.seed, step, _APART, index))
-            yield sample_group(scenes, self._config.patches, self.levels, rng)
 
     def _plain_and_cleared(self, scenes: Sequence[TrainingScene]) -> tuple[Model, int]:
         """The averaged weights as they are used, and how many of their channels are idle and were set to 0."""
         plain = self._architecture.plain(self._average)
+        return plain, clear(plain, partial(self._show, plain, scenes, 0, torch.device("cpu")))
 
-        def show() -> None:
-            for group in self._sample(scenes, 0):
-                batch = Batch.of([group], torch.device("cpu"))
-                self._architecture.predict(plain, batch, partial(torch.autocast, "cpu", enabled=False))
-
-        return plain, clear(plain, show)
+    def _show(self, model: Model, scenes: Sequence[TrainingScene], step: int, device: torch.device) -> None:
+        """Run a model over patches that show what its channels do, in float32, the same ones in every process."""
+        for index in range(_LOOKED_AT):
+            rng = np.random.default_rng((self._config.seed, step, _APART, index))
+            group = sample_group(scenes, self._config.patches, self.levels, rng)
+            exact = partial(torch.autocast, device.type, enabled=False)
+            self._architecture.predict(model, Batch.of([group], device), exact)
 
     @property
     def levels(self) -> Levels:

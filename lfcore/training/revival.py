@@ -60,7 +60,7 @@ def inputs_of(stacks: Sequence[PaperStack]) -> Iterator[list[list[Tensor]]]:
 
 
 def _revive_stack(stack: PaperStack, inputs: list[Tensor], around: Surroundings) -> int:
-    layers = [layer for layer in stack.hidden if isinstance(layer, nn.Conv2d)]
+    layers = stack.convolutions
     revived = 0
     for layer, following in zip(layers, [*layers[1:], stack.last], strict=True):
         sums = [layer(x) for x in inputs]  # before the ReLU
