@@ -171,7 +171,7 @@ HALVED_PART void put_row(const Result *r, const Pending *pending, Py_ssize_t row
 }
 
 /* One group of columns or two, a constant. Sums are put into the result while the next ones are computed; of the last blocks some
- * are computed again. matrix, bias: the group's own. room: (2, 4 * ROWS * COLUMNS). */
+ * are computed again. Blocks of lines below one another come after one another, since those of a picture share rows. matrix, bias: the group's own. room: (2, 4 * ROWS * COLUMNS). */
 AMX_PART void multiply_groups(const Blocks *b, const Pieces *pieces, const char *matrix, const float *bias, const Result *r,
                               Py_ssize_t group, const int groups, float *room) {
     const int together = groups == 2 ? 2 : 4;
@@ -181,7 +181,7 @@ AMX_PART void multiply_groups(const Blocks *b, const Pieces *pieces, const char 
         const char *places[4];
         for (int k = 0; k < together; ++k) {
             const Py_ssize_t own = at_most(block + k, blocks - 1);
-            places[k] = b->first + own / b->across * b->to_next_line + own % b->across * b->to_next;
+            places[k] = b->first + own % b->down * b->to_next_line + own / b->down * b->to_next;
         }
         if (groups == 2)
             begin_two_by_two(bias);
@@ -202,7 +202,7 @@ AMX_PART void multiply_groups(const Blocks *b, const Pieces *pieces, const char 
         pending.sums = sums;
         pending.rows = at_most(together, blocks - block) * ROWS;
         for (int k = 0; k < together; ++k) {
-            const Py_ssize_t line = (block + k) / b->across, row = (block + k) % b->across * ROWS;
+            const Py_ssize_t line = (block + k) % b->down, row = (block + k) / b->down * ROWS;
             pending.of_block[k].count = at_most(ROWS, r->width - row);
             pending.of_block[k].place = (line * r->width + row) * r->outputs + group * COLUMNS;
         }
