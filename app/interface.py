@@ -15,7 +15,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import ImVec4, imgui
 
-from app import painting, panels, theme
+from app import painting, panel_painting, panels, theme
 from app.canvas import Canvas, Colours, Frame, Pixels, Target, WindowCopy, draws_in_software, spread_rasteriser
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
@@ -154,6 +154,8 @@ class Interface:
         self.surroundings.tick(now, imgui.is_any_mouse_down() or state.swaying)
         self._synchronise()
         self._synchronise_exhibit()
+        if self._paint(target, layout, pixels):
+            return
         if self._light_field is not None:
             self._draw_picture(target, layout, pixels)
         else:
@@ -190,9 +192,7 @@ class Interface:
         if self._cleared:
             return
         self._cleared = True
-        grounds = [area for area in (layout.panel, layout.status) if area is not None]
-        rectangles = [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in grounds]
-        self._canvas.begin(target, rectangles, _rgb(theme.BACKGROUND), around)
+        self._canvas.begin(target, _panel_grounds(layout, pixels), _rgb(theme.BACKGROUND), around)
 
     def _prepare(self) -> None:
         """Make the picture at the light field's own size, and time it."""
@@ -367,12 +367,37 @@ class Interface:
         colours = Colours(state.looking.colour_map, caption.span) if caption.span is not None else None
         self._canvas.draw_exhibit(target, _scaled(area, pixels), _magnified(placement, pixels), colours)
 
-    def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
-        """`pixels`: framebuffer pixels per window unit."""
+    def _paint(self, target: Target, layout: Layout, pixels: float) -> bool:
+        """Paint the whole window in the processor's memory and copy it there, where all that is in it can be painted; whether
+        that was so."""
+        if self._light_field is None or self._saving or layout.strips is not None:
+            return False
+        frame = self._prepare_to_date()
+        if self._copied(layout, pixels) is None:
+            return False
+        pieces = panel_painting.pieces_of(imgui.get_draw_data(), target.size)
+        if pieces is None:
+            return False
+        (pane,) = arrange(self.controller.state, layout.picture)
+        placement = pane.placement(self.controller.state.zoom, self._canvas.picture_size(frame.look))
+        grounds, background = _panel_grounds(layout, pixels), _rgb(theme.BACKGROUND)
+        area, magnified = _scaled(pane.clip, pixels), _magnified(placement, pixels)
+        sheet = self._canvas.sheet(frame, target.size, grounds, background, area, magnified)
+        panel_painting.paint(pieces, sheet)
+        self._canvas.show(sheet, target)
+        return True
+
+    def _prepare_to_date(self) -> Frame:
+        """The frame of the picture, which is made anew where the panels have changed it, or the canvas has taken more since."""
         frame = self._frame()
-        if frame != self._prepared:  # the panels have changed it, or the canvas has taken more since
+        if frame != self._prepared:
             self._canvas.prepare(frame)
             self._prepared = frame
+        return frame
+
+    def _draw_picture(self, target: Target, layout: Layout, pixels: float) -> None:
+        """`pixels`: framebuffer pixels per window unit."""
+        frame = self._prepare_to_date()
         copied = self._copied(layout, pixels)
         if copied is None:
             self._clear(target, layout, pixels)
@@ -466,6 +491,12 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "There is not enough memory for this; close other programs or open a smaller light field."
     return f"Unexpected fault in the program: {type(error).__name__}: {error}"
+
+
+def _panel_grounds(layout: Layout, pixels: float) -> list[tuple[Rect, tuple[float, float, float]]]:
+    """Where panels lie, in framebuffer pixels, and in which colour."""
+    areas = [area for area in (layout.panel, layout.status) if area is not None]
+    return [(_scaled(area, pixels), _rgb(theme.PANEL)) for area in areas]
 
 
 def _rgb(colour: ImVec4) -> tuple[float, float, float]:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.canvas.compared import Compared
-from app.canvas.copying import WindowCopy
+from app.canvas.copying import WindowCopy, enlarge
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.inside import Inside
 from app.canvas.magnifier import Colours, Magnifier
@@ -36,8 +36,11 @@ from app.state import CARRIED, Look, Reach
 from app.tone import Tone
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray
+from lfcore.synthesis import ByteArray
 
 _Bytes = npt.NDArray[np.uint8]
+Colour = tuple[float, float, float]  # red, green, blue, 0 to 1
+Ground = tuple[Rect, Colour]  # a rectangle in pixels of the target, y downwards, and what it is filled with
 
 
 @dataclass(frozen=True)
@@ -237,8 +240,8 @@ class Canvas:
     def begin(
         self,
         target: Target,
-        rectangles: Sequence[tuple[Rect, tuple[float, float, float]]] = (),
-        background: tuple[float, float, float] = BACKGROUND,
+        rectangles: Sequence[Ground] = (),
+        background: Colour = BACKGROUND,
         around: Pixels | None = None,
     ) -> None:
         """Start a frame: all of the target in the background colour, and rectangles (in its pixels, y downwards) in others.
@@ -251,11 +254,8 @@ class Canvas:
         framebuffer.use()
         if around is None:
             framebuffer.clear(*background, 1.0)
-        strips = around.surroundings(target.size) if around is not None else []
-        seen = [strip for strip in strips if not any(area.holds(strip) for area, _ in rectangles)]
-        for area, colour in (*((strip, background) for strip in seen), *rectangles):
-            left, right = round(area.x), round(area.x + area.width)
-            top, bottom = round(area.y), round(area.y + area.height)
+        for area, colour in _grounds(rectangles, background, around, target.size):
+            left, top, right, bottom = _rounded(area)
             framebuffer.clear(*colour, 1.0, viewport=(left, height - bottom, right - left, bottom - top))
 
     def prepare(self, frame: Frame) -> bool:
@@ -287,6 +287,29 @@ class Canvas:
             self._magnifier.map(made, colours, target, area, placement)
         else:
             self._magnifier.image(made, frame.dim, target, area, placement)
+
+    def sheet(
+        self, frame: Frame, size: Size, rectangles: Sequence[Ground], background: Colour, area: Rect, placement: Placement
+    ) -> ByteArray:
+        """What `begin` and `draw` would make of a window of this (width, height), in the processor's memory: (H, W, 4), blue
+        first. Only for what is `copied`."""
+        made, copied, copy = self._made(frame), self.copied(frame, area, placement), self._copy
+        assert isinstance(made, Painted) and copied is not None and copy is not None
+        sheet = copy.sheet(size)
+        whole = sheet.view(np.uint32)[..., 0]  # (H, W): filled much faster than byte by byte
+        for ground, colour in _grounds(rectangles, background, copied, size):
+            left, top, right, bottom = _rounded(ground)
+            pixel = np.array([*(round(255 * value) for value in reversed(colour)), 255], np.uint8)
+            whole[max(top, 0) : bottom, max(left, 0) : right] = pixel.view(np.uint32)
+        inside = sheet[copied.y : copied.y + copied.height, copied.x : copied.x + copied.width]
+        if inside.size:
+            enlarge(made.pixels, copied, placement, inside)
+        return sheet
+
+    def show(self, sheet: ByteArray, target: Target) -> None:
+        """Make the target, a window, what the sheet is, which is the one that was made last."""
+        assert self._copy is not None
+        self._copy.show(sheet, target)
 
     def _copy_for(self, frame: Frame, placement: Placement) -> WindowCopy | None:
         """What copies the frame's picture, if it has been painted; None where it has to be drawn."""
@@ -371,6 +394,18 @@ class Canvas:
         if self._makers is None:
             raise RuntimeError("the canvas has no light field")
         return self._makers
+
+
+def _grounds(rectangles: Sequence[Ground], background: Colour, around: Pixels | None, size: Size) -> Sequence[Ground]:
+    """Rectangles, and before them what lies around a picture and not in one of them."""
+    strips = around.surroundings(size) if around is not None else []
+    seen = [strip for strip in strips if not any(area.holds(strip) for area, _ in rectangles)]
+    return (*((strip, background) for strip in seen), *rectangles)
+
+
+def _rounded(area: Rect) -> tuple[int, int, int, int]:
+    """(left, top, right, bottom) in whole pixels; the last two lie outside."""
+    return round(area.x), round(area.y), round(area.x + area.width), round(area.y + area.height)
 
 
 def _wanted(frame: Frame) -> Wanted:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.canvas.frame import Target
-from app.canvas.placing import sampling, visible
+from app.canvas.placing import Pixels, sampling, visible
 from app.geometry import Placement, Rect, Size
 from app.painting import Places, enlarged
 from lfcore.synthesis import ByteArray
@@ -65,18 +65,21 @@ class WindowCopy:
 
     def image(self, picture: ByteArray, target: Target, area: Rect, placement: Placement) -> None:
         """A picture (H, W, 4) into its place in the window, as Magnifier.image draws it."""
-        height, width = picture.shape[:2]
-        inside = visible((width, height), area, placement)
-        if min(inside.width, inside.height) == 0:
-            return
-        self._make_room((inside.width, inside.height))
-        sampled = _SAMPLED[sampling(placement.scale)]
-        along_x = (np.arange(inside.x, inside.x + inside.width) + (0.5 - placement.origin[0])) / placement.scale
-        along_y = (np.arange(inside.y, inside.y + inside.height) + (0.5 - placement.origin[1])) / placement.scale
-        seen = self._room[: 4 * inside.width * inside.height].reshape(inside.height, inside.width, 4)
-        enlarged(picture, sampled(along_y, height), sampled(along_x, width), seen)
-        self._hand_over(seen)
-        self._copy(target, (inside.x, inside.y), (inside.width, inside.height))
+        inside = visible((picture.shape[1], picture.shape[0]), area, placement)
+        if min(inside.width, inside.height) > 0:
+            seen = self.sheet((inside.width, inside.height))
+            enlarge(picture, inside, placement, seen)
+            self.show(seen, target, (inside.x, inside.y))
+
+    def sheet(self, size: Size) -> ByteArray:
+        """Memory for pixels (H, W, 4), blue first, that `show` takes; whatever was in it before."""
+        self._make_room(size)
+        return self._room[: 4 * size[0] * size[1]].reshape(size[1], size[0], 4)
+
+    def show(self, sheet: ByteArray, target: Target, corner: Size = (0, 0)) -> None:
+        """The sheet that was asked for last into the window, its first pixel there."""
+        self._hand_over(sheet)
+        self._copy(target, corner, (sheet.shape[1], sheet.shape[0]))
 
     def _hand_over(self, pixels: ByteArray) -> None:
         height, width = pixels.shape[:2]
@@ -112,3 +115,12 @@ class WindowCopy:
         places = (0, 0, width, height, left, lowest - top, left + width, lowest - top - height)
         self._gl["glBlitFramebuffer"](*places, _COLOR_BUFFER_BIT, _NEAREST)
         target.framebuffer.use()  # as moderngl believes it to be
+
+
+def enlarge(picture: ByteArray, inside: Pixels, placement: Placement, out: ByteArray) -> None:
+    """These pixels of the window of a picture (H, W, 4) that lies at the placement, which WindowCopy.suits: set in `out`."""
+    height, width = picture.shape[:2]
+    sampled = _SAMPLED[sampling(placement.scale)]
+    along_x = (np.arange(inside.x, inside.x + inside.width) + (0.5 - placement.origin[0])) / placement.scale
+    along_y = (np.arange(inside.y, inside.y + inside.height) + (0.5 - placement.origin[1])) / placement.scale
+    enlarged(picture, sampled(along_y, height), sampled(along_x, width), out)

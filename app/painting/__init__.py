@@ -6,6 +6,7 @@ Optional, as lfcore.kernels is: where nothing was compiled, shaders do all of it
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,11 @@ from lfcore.lightfield import FloatArray
 from lfcore.metrics import to_uint8
 from lfcore.synthesis import ByteArray
 
+Memory = npt.NDArray[np.generic] | ctypes.Array[ctypes.c_char]  # that lies in one piece
+
+CHANNELS = 4  # bytes of a pixel
 MARGIN = 3  # pixels by which a spread picture is continued; as in carried.c
-_FUNCTIONS = ("carried", "spread", "in_bytes", "mixed", "enlarged")
+_FUNCTIONS = ("carried", "spread", "in_bytes", "mixed", "enlarged", "triangles")
 
 _PAINTING = extension("app.painting._painting", _FUNCTIONS)
 
@@ -108,7 +112,39 @@ class Places:
 
 
 def enlarged(picture: ByteArray, rows: Places, columns: Places, out: ByteArray) -> None:
-    """The picture at these places, blue first, as windows are kept. out: (rows, columns, 4), set."""
+    """The picture at these places, blue first, as windows are kept. out: (rows, columns, 4), set; its rows may lie apart."""
     assert _PAINTING is not None
     height, width = picture.shape[:2]
     _PAINTING.enlarged(height, width, picture, (rows.first, rows.share), (columns.first, columns.share), out)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle of whole pixels, y downwards; right and bottom lie outside."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+
+CORNER_BYTES = 20  # place (x, y) in pixels, place in the texture (u, v) of 0 to 1: float32; colour: red first, then covering
+
+
+@dataclass(frozen=True)
+class Texture:
+    """What triangles are filled with. pixels: (h, w, 4), red first; white: they differ only in how much they cover."""
+
+    pixels: ByteArray
+    white: bool
+
+
+def triangles(sheet: ByteArray, box: Box, texture: Texture, corners: Memory, indices: Memory) -> None:
+    """Triangles blended over a sheet within a box, as graphics draw them: colours times a texture between its pixels.
+
+    sheet: (H, W, 4), blue first, as windows are kept. corners: CORNER_BYTES each. indices: uint32, three corners a triangle.
+    Raises ValueError for a corner that is not there.
+    """
+    assert _PAINTING is not None
+    bounds, filling = (box.left, box.top, box.right, box.bottom), texture.pixels
+    _PAINTING.triangles(*sheet.shape[:2], sheet, bounds, *filling.shape[:2], filling, texture.white, corners, indices)

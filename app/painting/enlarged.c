@@ -62,6 +62,7 @@ typedef struct {
     Py_ssize_t height, width;
     Places rows, columns;
     uint8_t *out; /* (rows, columns, CHANNELS) */
+    Py_ssize_t to_next; /* bytes from one row of it to the next */
 } Enlarging;
 
 /* Memory for the work. */
@@ -93,7 +94,7 @@ static void enlarge(const Enlarging *e, Scratch *s) {
     for (Py_ssize_t y = 0; y < e->rows.count; ++y) {
         const Py_ssize_t first = e->rows.first[y], next = at_most(first + 1, e->height - 1);
         const uint16_t *above = row_at(e, s, first, next), *below = row_at(e, s, next, first);
-        between_rows(above, below, whole_share(e->rows.share[y]), e->out + y * values, values);
+        between_rows(above, below, whole_share(e->rows.share[y]), e->out + y * e->to_next, values);
     }
 }
 
@@ -125,24 +126,36 @@ static int enlarge_in_scratch(const Enlarging *e) {
     return room;
 }
 
+/* Whether pixels of so many rows and columns can be written there, whose rows may lie apart; else an exception is set. */
+static int are_pixels(const Py_buffer *out, Py_ssize_t rows, Py_ssize_t columns) {
+    const int laid_out = out->ndim == 3 && out->shape[2] == CHANNELS && out->strides[2] == 1 && out->strides[1] == CHANNELS;
+    if (laid_out && out->shape[0] == rows && out->shape[1] == columns) return 1;
+    PyErr_Format(PyExc_ValueError, "%zd bytes laid out otherwise were handed over in place of %zd x %zd pixels", out->len, rows,
+                 columns);
+    return 0;
+}
+
 static Places places_in(const Py_buffer *first, const Py_buffer *share) {
     return (Places){first->buf, share->buf, first->len / (Py_ssize_t)sizeof(int32_t)};
 }
 
 PyObject *enlarged(PyObject *Py_UNUSED(module), PyObject *arguments) {
     Enlarging e;
-    Py_buffer pixels, rows, row_shares, columns, column_shares, out;
-    if (!PyArg_ParseTuple(arguments, "nny*(y*y*)(y*y*)w*", &e.height, &e.width, &pixels, &rows, &row_shares, &columns,
-                          &column_shares, &out))
+    Py_buffer pixels, rows, row_shares, columns, column_shares, out = {0};
+    PyObject *written;
+    if (!PyArg_ParseTuple(arguments, "nny*(y*y*)(y*y*)O", &e.height, &e.width, &pixels, &rows, &row_shares, &columns,
+                          &column_shares, &written))
         return NULL;
     e.rows = places_in(&rows, &row_shares);
     e.columns = places_in(&columns, &column_shares);
-    int right = e.height > 0 && e.width > 0 && holds(&pixels, e.height * e.width * CHANNELS) && holds(&row_shares, rows.len) &&
-                holds(&column_shares, columns.len) && holds(&out, e.rows.count * e.columns.count * CHANNELS) &&
+    int right = PyObject_GetBuffer(written, &out, PyBUF_WRITABLE | PyBUF_STRIDES) == 0 && e.height > 0 && e.width > 0 &&
+                holds(&pixels, e.height * e.width * CHANNELS) && holds(&row_shares, rows.len) &&
+                holds(&column_shares, columns.len) && are_pixels(&out, e.rows.count, e.columns.count) &&
                 lie_within(&e.rows, e.height) && lie_within(&e.columns, e.width);
     if (right) {
         e.pixels = pixels.buf;
         e.out = out.buf;
+        e.to_next = out.strides[0];
         right = enlarge_in_scratch(&e);
     }
     for (int k = 0; k < 6; ++k) PyBuffer_Release((Py_buffer *[]){&pixels, &rows, &row_shares, &columns, &column_shares, &out}[k]);

@@ -7,6 +7,7 @@ PyObject *spread(PyObject *module, PyObject *arguments); /* carried.c */
 PyObject *in_bytes(PyObject *module, PyObject *arguments); /* in_bytes.c */
 PyObject *mixed(PyObject *module, PyObject *arguments); /* mixed.c */
 PyObject *enlarged(PyObject *module, PyObject *arguments); /* enlarged.c */
+PyObject *triangles(PyObject *module, PyObject *arguments); /* triangles.c */
 
 static PyMethodDef methods[] = {
     {"carried", carried, METH_VARARGS, NULL},
@@ -14,6 +15,7 @@ static PyMethodDef methods[] = {
     {"in_bytes", in_bytes, METH_VARARGS, NULL},
     {"mixed", mixed, METH_VARARGS, NULL},
     {"enlarged", enlarged, METH_VARARGS, NULL},
+    {"triangles", triangles, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };
 
