@@ -180,7 +180,7 @@ class Controller:
             if not self.state.dragging:
                 self.state.hand = None
         self._shown = self.viewpoint
-        self._screen.go_on(self.viewpoint, self._resting)
+        self._screen.go_on(self.viewpoint)
         self._compare(self.light_field)
         self.eyes.look_up(self.light_field, self.state, self._cached)
         if not self.previewing:
@@ -477,7 +477,7 @@ class Controller:
                 if answered.wish.task is Task.COMPARE:
                     self.comparing.take(answered.wish, answered.answer)
                 else:
-                    self._screen.accept(answered.answer, self.viewpoint, self._resting)
+                    self._screen.accept(answered.answer, self.viewpoint)
         for message in self.comparing.news():
             self.say(message)
 

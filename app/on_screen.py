@@ -10,8 +10,7 @@ from app.geometry import Point
 from app.readout import ScoreText
 from app.state import SEAMLESS, Step
 
-FADE_SECONDS = 0.1
-STREAM_FADE_SECONDS = 0.06  # while the hand moves
+FADE_SECONDS = 0.06
 # A synthesis for a viewpoint that the hand has left is of use as long as it is not much farther off than the one at hand.
 _FARTHER = 0.02
 _SPAN_TAIL = 1.0  # per cent of the disparities left out at either end of the scene's span
@@ -26,7 +25,7 @@ class OnScreen:
         self.span: tuple[float, float] | None = None  # least and greatest disparity of the scene, by the first map
         self._next: Answer | None = None
         self._now = 0.0
-        self._fade_from, self._fade_seconds = -math.inf, FADE_SECONDS
+        self._fade_from = -math.inf
 
     def clear(self) -> None:
         """Nothing is on screen."""
@@ -35,19 +34,19 @@ class OnScreen:
     @property
     def share(self) -> float:
         """How far the newest synthesis has been faded in."""
-        return min(max((self._now - self._fade_from) / self._fade_seconds, 0.0), 1.0)
+        return min(max((self._now - self._fade_from) / FADE_SECONDS, 0.0), 1.0)
 
     def pass_time(self, now: float) -> None:
         """It is `now`, in seconds, perhaps long after the last frame: what comes from now on fades in from now on."""
         self._now = now
 
-    def go_on(self, here: Point, resting: bool) -> None:
+    def go_on(self, here: Point) -> None:
         """What waited for the end of a fade may follow."""
         if self._next is not None and self.share >= 1.0:
             answer, self._next = self._next, None
-            self.accept(answer, here, resting)
+            self.accept(answer, here)
 
-    def accept(self, answer: Answer, here: Point, resting: bool) -> None:
+    def accept(self, answer: Answer, here: Point) -> None:
         """Show an answer at the viewpoint `here`, unless something better is there, once that has been faded in."""
         exact = viewpoint_of(answer) == here
         if self.picture is not None and (not exact or (self.picture.final and not answer.final)):
@@ -62,7 +61,6 @@ class OnScreen:
         same = self.picture is not None and self.picture.final  # as on screen, but now with its score
         if not same and not self._follows_seamlessly(answer):
             self._fade_from = self._now
-            self._fade_seconds = FADE_SECONDS if resting else STREAM_FADE_SECONDS
         self.newest = answer
         if self.span is None and answer.percentiles is not None:
             self.span = disparity_range(answer.percentiles, _SPAN_TAIL)

@@ -12,7 +12,7 @@ from moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
 from app.controller import MAGNET_RADIUS, REST_SECONDS, Controller
 from app.engine import Engine, disparity_range
-from app.on_screen import FADE_SECONDS, STREAM_FADE_SECONDS
+from app.on_screen import FADE_SECONDS
 from app.state import Look, Step
 from app.worker import Cancel
 from lfcore.errors import InputError, WeightsError
@@ -390,7 +390,7 @@ def test_the_picture_is_refined_as_soon_as_the_quick_one_is_there_though_the_han
     controller.state.move_to(0.51, 0.5)
     program.until(lambda: len(program.synthesizer.asked) > 1, 0.0)  # no time passes: the hand does not count as resting
     assert quick.asked[-1] == program.synthesizer.asked[-1] == (0.51, 0.5)
-    program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))  # the quick one has been faded in
+    program.tick(0.5 * (FADE_SECONDS + REST_SECONDS))  # the quick one has been faded in
     program.until(lambda: controller.step is Step.FULL, 0.0)
     assert len(program.synthesizer.asked) == 2  # and nothing is computed ahead yet
 
@@ -417,7 +417,7 @@ def test_between_two_quick_syntheses_the_newest_one_is_carried(pair: tuple[Progr
     program.tick(0.0)
     assert controller.step is Step.INSTANT  # carried, but not made by the quick model
     program.until(lambda: controller.picture is not None, 0.0)
-    program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))
+    program.tick(0.5 * (FADE_SECONDS + REST_SECONDS))
     quick.seconds = 60.0
     controller.state.move_to(0.54, 0.5)
     program.tick(0.0)
@@ -452,7 +452,7 @@ def test_a_synthesis_that_comes_during_a_fade_waits_for_its_end(program: Program
     program.open_and_fade_in("3x3")
     changed_at = moves_on(program, 60)
     assert len(changed_at) > 3
-    assert min(later - earlier for earlier, later in pairwise(changed_at)) >= STREAM_FADE_SECONDS - 1e-6
+    assert min(later - earlier for earlier, later in pairwise(changed_at)) >= FADE_SECONDS - 1e-6
 
 
 def test_quick_syntheses_follow_each_other_without_a_fade(pair: tuple[Program, TruthSynthesizer]) -> None:
@@ -462,7 +462,7 @@ def test_quick_syntheses_follow_each_other_without_a_fade(pair: tuple[Program, T
     controller.state.move_to(0.49, 0.5)
     program.until(lambda: controller.newest is not None and controller.newest.step is Step.REALTIME, 0.0)
     assert controller.share < 1  # from the one to the other model there is one
-    program.tick(0.5 * (STREAM_FADE_SECONDS + REST_SECONDS))
+    program.tick(0.5 * (FADE_SECONDS + REST_SECONDS))
     first = controller.newest
     controller.state.move_to(0.48, 0.5)
     program.until(lambda: controller.newest is not first, 0.0)
