@@ -33,9 +33,10 @@ class CompactConfig:
     levels: Levels = field(default_factory=lambda: Levels(32))
     width: int = 64  # channels of the disparity network at a quarter of the resolution
     dilations: tuple[int, ...] = (1, 8)  # of its residual blocks
-    fine_width: int = 48  # its channels at half resolution
-    colour_width: int = 48
+    fine_width: int = 32  # its channels at half resolution
+    colour_width: int = 32
     colour_blocks: int = 2
+    inner_width: int = 32  # channels between the two convolutions of a residual block, in both networks
 
 
 class CompactModel(nn.Module):
@@ -51,10 +52,10 @@ class CompactModel(nn.Module):
 class ResidualBlock(nn.Module):
     """x + conv(relu(conv(relu(x)))), 3x3, size unchanged."""
 
-    def __init__(self, channels: int, dilation: int = 1) -> None:
+    def __init__(self, channels: int, inner: int, dilation: int = 1) -> None:
         super().__init__()
-        self.first = nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation)
-        self.second = nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation)
+        self.first = nn.Conv2d(channels, inner, 3, padding=dilation, dilation=dilation)
+        self.second = nn.Conv2d(inner, channels, 3, padding=dilation, dilation=dilation)
 
     def forward(self, x: Tensor) -> Tensor:
         result: Tensor = x + self.second(F.relu(self.first(F.relu(x))))
@@ -73,7 +74,7 @@ class CompactDisparity(nn.Module):
         super().__init__()
         count, width, fine = config.levels.count, config.width, config.fine_width
         self.stem = nn.Conv2d(count, width, 3, stride=2, padding=1)
-        self.blocks = nn.Sequential(*(ResidualBlock(width, dilation) for dilation in config.dilations))
+        self.blocks = nn.Sequential(*(ResidualBlock(width, config.inner_width, dilation) for dilation in config.dilations))
         self.rise = nn.Conv2d(width, 4 * fine, 1)
         self.skip = nn.Conv2d(count, fine, 3, padding=1)
         self.join = nn.Conv2d(fine, fine, 3, padding=1)
@@ -119,7 +120,7 @@ class CompactColour(nn.Module):
         super().__init__()
         width = config.colour_width
         self.stem = nn.Conv2d(4 * (3 + 3 * INPUTS) + 4, width, 3, padding=1)
-        self.blocks = nn.Sequential(*(ResidualBlock(width) for _ in range(config.colour_blocks)))
+        self.blocks = nn.Sequential(*(ResidualBlock(width, config.inner_width) for _ in range(config.colour_blocks)))
         self.weights = nn.Conv2d(width, 4 * INPUTS, 3, padding=1)
         self.residual = nn.Conv2d(width, 4 * 3, 3, padding=1)
         # A straight way past the layers: sharpening and a change of colours are nearly linear, and are learnt here first.
@@ -180,7 +181,7 @@ def _initialise_layers(model: nn.Module, seed: int) -> None:
 def _start_as_sweep(network: CompactDisparity) -> None:
     """Begin with little more than the sweep's own minimum; full resolution starts as the coarse pixel itself, mostly."""
     with torch.no_grad():
-        network.score.weight *= 0.1
+        network.score.weight *= 0.05
         network.spread.weight *= 0.1
         assert network.spread.bias is not None
         network.spread.bias.view(4, 9)[:, 4] = 2.0

@@ -13,6 +13,7 @@ from app.widgets import em, packed, tooltip
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 
 _SPAN = 1 + 2 * EXTRAPOLATION_LIMIT
+_DOT_SIDES = 8  # of hundreds of dots a few pixels wide, whose corners nobody sees
 
 
 def draw(state: ViewState, readout: Readout, size: float) -> None:
@@ -48,14 +49,14 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     brush.add_line(ImVec2(here.x, corner.y), ImVec2(here.x, corner.y + size), packed(theme.LINE))
     brush.add_line(ImVec2(corner.x, here.y), ImVec2(corner.x + size, here.y), packed(theme.LINE))
     for point in readout.cached:
-        brush.add_circle_filled(at(point), em() * 0.17, packed(theme.ACCENT_DEEP))
+        brush.add_circle_filled(at(point), em() * 0.17, packed(theme.ACCENT_DEEP), _DOT_SIDES)
     grid = readout.grid
     if grid is not None:
         radius = min(em() * 0.14, size / _SPAN / max(grid.rows, grid.columns) * 0.25)
         for index in range(grid.rows * grid.columns):
             dark = divmod(index, grid.columns) in grid.dark
             colour = theme.FIELD_ACTIVE if dark else theme.TEXT_SOFT
-            brush.add_circle_filled(at(grid.position(index)), radius, packed(colour))
+            brush.add_circle_filled(at(grid.position(index)), radius, packed(colour), _DOT_SIDES)
     if exporting:
         for stop in drawn_path(state.export):
             brush.path_line_to(at((stop.u, stop.v)))
