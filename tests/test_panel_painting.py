@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from imgui_bundle import ImVec2, imgui
 
 from app import panel_painting
 from app.canvas import Canvas
@@ -234,6 +235,14 @@ def test_a_painted_window_is_the_one_that_is_drawn(
     viewer: Offscreen, painted: list[int], monkeypatch: pytest.MonkeyPatch, scale: float
 ) -> None:
     viewer.interface.set_scale(scale)
+    assert both_ways(viewer, painted, monkeypatch) < 0.0005
+
+
+def test_so_it_is_where_a_window_unit_is_two_pixels(
+    viewer: Offscreen, painted: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    io = imgui.get_io()
+    io.display_size, io.display_framebuffer_scale = ImVec2(500, 350), ImVec2(2, 2)
     assert both_ways(viewer, painted, monkeypatch) < 0.0005
 
 
