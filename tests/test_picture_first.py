@@ -96,10 +96,11 @@ def test_a_synthesis_that_comes_during_the_frame_is_for_the_next_one(
         pad(*arguments)
         wait_until(lambda: not controller._asking._worker.outcomes.empty(), "the synthesis")
 
-    monkeypatch.setattr(viewpoint_pad, "draw", waiting_pad)
     controller.state.move_to(*MOVED)
-    viewer.draw()
+    with monkeypatch.context() as patched:
+        patched.setattr(viewpoint_pad, "draw", waiting_pad)
+        viewer.draw()
     assert recorder.order == [("made", MOVED), ("panels", MOVED), ("shown", MOVED)]
     assert controller.newest is before
     viewer.draw()
-    assert controller.newest is not before
+    assert controller.newest is not before and not controller.messages
