@@ -184,8 +184,12 @@ class Interface:
         panes = arrange(self.controller.state, layout.picture)
         if len(panes) > 1 or panes[0].partner or self._prepared is None:
             return None
-        placement = panes[0].placement(self.controller.state.zoom, self._canvas.picture_size(self._prepared.look))
-        return self._canvas.copied(self._prepared, _scaled(panes[0].clip, pixels), _magnified(placement, pixels))
+        return self._canvas.copied(self._prepared, *self._where(panes[0], self._prepared, pixels))
+
+    def _where(self, pane: Pane, frame: Frame, pixels: float) -> tuple[Rect, Placement]:
+        """The area in which a frame's picture is seen, and where it lies there, in framebuffer pixels."""
+        placement = pane.placement(self.controller.state.zoom, self._canvas.picture_size(frame.look))
+        return _scaled(pane.clip, pixels), _magnified(placement, pixels)
 
     def _clear(self, target: Target, layout: Layout, pixels: float, around: Pixels | None = None) -> None:
         """Give the window its grounds, once a frame."""
@@ -379,10 +383,8 @@ class Interface:
         if pieces is None:
             return False
         (pane,) = arrange(self.controller.state, layout.picture)
-        placement = pane.placement(self.controller.state.zoom, self._canvas.picture_size(frame.look))
         grounds, background = _panel_grounds(layout, pixels), _rgb(theme.BACKGROUND)
-        area, magnified = _scaled(pane.clip, pixels), _magnified(placement, pixels)
-        sheet = self._canvas.sheet(frame, target.size, grounds, background, area, magnified)
+        sheet = self._canvas.sheet(frame, target.size, grounds, background, *self._where(pane, frame, pixels))
         panel_painting.paint(pieces, sheet)
         self._canvas.show(sheet, target)
         return True
@@ -404,8 +406,7 @@ class Interface:
         state = self.controller.state
         for pane in arrange(state, layout.picture):
             shown = self._partner_frame() if pane.partner else frame
-            placement = pane.placement(state.zoom, self._canvas.picture_size(shown.look))
-            self._canvas.draw(shown, target, _scaled(pane.clip, pixels), _magnified(placement, pixels))
+            self._canvas.draw(shown, target, *self._where(pane, shown, pixels))
         self._clear(target, layout, pixels, copied)
         if layout.strips is not None and state.sliced is not None:
             self._draw_slices(layout.strips, state.sliced, target, arrange(state, layout.picture)[0], pixels)

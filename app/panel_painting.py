@@ -14,7 +14,6 @@ from app.painting import CORNER_BYTES, Box, Memory, Texture
 from lfcore.synthesis import ByteArray
 
 _INDEX_BYTES = 4
-_TO_DATE = 0  # ImTextureStatus_OK, for which the bindings have no name that is valid
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def _textures(data: imgui.ImDrawData) -> dict[int, Texture] | None:
     """Pixels of imgui's own textures by their number; None where the graphics do not have them as they are."""
     known: dict[int, Texture] = {}
     for texture in data.textures:
-        if int(texture.status) != _TO_DATE or texture.bytes_per_pixel != painting.CHANNELS:
+        if texture.status != imgui.ImTextureStatus.ok or texture.bytes_per_pixel != painting.CHANNELS:
             return None
         flat = np.asarray(texture.get_pixels_array(), np.uint8)
         pixels = flat.reshape(texture.height, texture.width, painting.CHANNELS)

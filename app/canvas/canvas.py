@@ -38,7 +38,6 @@ from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray
 from lfcore.synthesis import ByteArray
 
-_Bytes = npt.NDArray[np.uint8]
 Colour = tuple[float, float, float]  # red, green, blue, 0 to 1
 Ground = tuple[Rect, Colour]  # a rectangle in pixels of the target, y downwards, and what it is filled with
 
@@ -160,10 +159,10 @@ class Canvas:
     def set_synthesis(
         self,
         image: FloatArray,
-        pixels: _Bytes,
+        pixels: ByteArray,
         disparity: FloatArray | None,
         viewpoint: Point,
-        weights: _Bytes | None = None,
+        weights: ByteArray | None = None,
     ) -> None:
         """Take the newest synthesis: image (H, W, 3), the same as uint8 (H, W, 4), disparity (H, W) in px over the baseline
         or None, its (u, v), and where they are known the weights (4, H, W) of the inputs in it, 255 = whole.
@@ -185,7 +184,7 @@ class Canvas:
         """
         self._at_hand.refocused.set_views(views, dark)
 
-    def set_eyes(self, eyes: Mapping[Point, _Bytes]) -> None:
+    def set_eyes(self, eyes: Mapping[Point, ByteArray]) -> None:
         """Take the syntheses (H, W, 4) for the viewpoints of a stereo pair's eyes, as far as they are there."""
         self._at_hand.stereo.set_eyes(eyes)
 
