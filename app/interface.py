@@ -15,7 +15,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import ImVec4, imgui
 
-from app import painting, panel_painting, panels, theme
+from app import painting, panel_painting, panels, repainting, theme
 from app.canvas import Canvas, Colours, Frame, Pixels, Target, WindowCopy, draws_in_software, spread_rasteriser
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
@@ -31,7 +31,9 @@ from app.gallery import Seen
 from app.geometry import Placement, Point, Rect, place, visible
 from app.layout import Layout, Strips
 from app.panes import Pane, arrange
+from app.repainting import Repainting
 from app.settings import Theme
+from app.shared_window import SharedWindow
 from app.state import CARRIED, CARRIED_IN_SOFTWARE, Look, Step
 from app.surroundings import Surroundings
 from assets import sample_path
@@ -48,7 +50,7 @@ _log = logging.getLogger(__name__)
 class Interface:
     """Draws frames into a framebuffer. Belongs to the thread on which the GL context and the imgui context are current.
 
-    load: of a window, the addresses of OpenGL's functions by name.
+    load: of a window, the addresses of OpenGL's functions by name; shared: another way into it for what has been painted.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Interface:
         scale: float,
         surroundings: Surroundings | None = None,
         load: Callable[[str], int] | None = None,
+        shared: SharedWindow | None = None,
     ) -> None:
         self.controller = controller
         self.surroundings = surroundings or Surroundings(controller, wake=lambda: None)
@@ -85,6 +88,8 @@ class Interface:
         self._timed = False  # a picture was made in the last frame
         self._prepared: Frame | None = None  # what has been made in this one of what the canvas has taken
         self._cleared = False  # the window has its grounds in this one
+        self._repainting = Repainting()
+        self._shared = shared
         self._saving = False  # the picture of this frame is to be saved
         self._picture_ms: float | None = None
         self._faults = 0  # frames in a row that have failed
@@ -109,20 +114,24 @@ class Interface:
             self._scale = scale
             theme.change_scale(scale)
 
-    def draw(self, target: Target, now: float) -> None:
-        """Draw one frame. imgui's display size and events must have been set (by its platform backend); `now` in seconds.
+    def draw(self, target: Target, now: float) -> bool:
+        """Draw one frame; whether it is in the target, and not on the screen already. imgui's display size and events must have
+        been set (by its platform backend); `now` in seconds.
 
         A fault becomes a message, and the next frame is drawn as if it had not been; where frames go on failing, what is
         open is closed, and at last the fault is raised.
         """
         try:
-            self._draw(target, now)
+            painted = self._draw(target, now)
             self._faults = 0
+            return not painted or self._shared is None
         except Exception as error:  # a fault in one part of the window must not take everything else with it
             self._survive(error)
+            return True
 
     def _survive(self, error: Exception) -> None:
         imgui.end_frame()  # where it was begun; imgui then closes the windows that were left open
+        self._repainting.forget()
         self._faults += 1
         if self._faults >= FAULTS_TO_END:
             raise error
@@ -131,7 +140,8 @@ class Interface:
             self.controller.close()
         self.controller.say(_sentence(error))
 
-    def _draw(self, target: Target, now: float) -> None:
+    def _draw(self, target: Target, now: float) -> bool:
+        """Draw one frame; whether it was painted."""
         self.controller.tick(now)
         self.surroundings.arrive()
         self._synchronise()
@@ -155,7 +165,8 @@ class Interface:
         self._synchronise()
         self._synchronise_exhibit()
         if self._paint(target, layout, pixels):
-            return
+            return True
+        self._repainting.forget()
         if self._light_field is not None:
             self._draw_picture(target, layout, pixels)
         else:
@@ -166,6 +177,7 @@ class Interface:
             self._save_picture(target, layout, pixels)
         target.framebuffer.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+        return False
 
     def _begin(self, target: Target, pixels: float, layout: Layout) -> None:
         """Have the picture made for what the hand has just done, and the window cleared.
@@ -218,6 +230,10 @@ class Interface:
     def next_frame_in(self) -> float | None:
         """As Controller.next_frame_in, but 0 also while the picture becomes better with every frame."""
         return 0.0 if self._canvas.unfinished else self.controller.next_frame_in
+
+    def uncover(self) -> None:
+        """The screen has lost something of the window."""
+        self._repainting.forget()
 
     def warm_up(self, target: Target) -> None:
         """Make the graphics ready for the first light field, while it is being opened; the target is drawn over."""
@@ -384,9 +400,14 @@ class Interface:
             return False
         (pane,) = arrange(self.controller.state, layout.picture)
         grounds, background = _panel_grounds(layout, pixels), _rgb(theme.BACKGROUND)
-        sheet = self._canvas.sheet(frame, target.size, grounds, background, *self._where(pane, frame, pixels))
-        panel_painting.paint(pieces, sheet)
-        self._canvas.show(sheet, target)
+        layers = self._canvas.beneath(frame, target.size, grounds, background, *self._where(pane, frame, pixels))
+        sheets = self._shared or self._canvas.sheets(target)
+        if not sheets.keeps(target.size):
+            self._repainting.forget()
+        sheet = sheets.sheet(target.size)
+        boxes = self._repainting.outdated(target.size, layers, pieces)
+        repainting.paint(sheet, boxes, layers, pieces)
+        sheets.show(sheet, boxes)
         return True
 
     def _prepare_to_date(self) -> Frame:

@@ -11,16 +11,17 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import painting
 from app.painting import CORNER_BYTES, Box, Memory, Texture
-from lfcore.synthesis import ByteArray
 
 _INDEX_BYTES = 4
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Triangles with one texture, within a rectangle. Its memory is imgui's, which keeps it until the next frame."""
+    """Triangles with one texture, within a rectangle. Its memory is imgui's, which keeps it until the next frame. number: the
+    texture's."""
 
     box: Box
+    number: int
     texture: Texture
     corners: Memory
     indices: Memory
@@ -38,7 +39,8 @@ def pieces_of(data: imgui.ImDrawData, size: tuple[int, int]) -> Sequence[Piece] 
     for drawn in data.cmd_lists:
         corners, indices = drawn.vtx_buffer, drawn.idx_buffer
         for command in drawn.cmd_buffer:
-            texture = textures.get(command.get_tex_id())
+            number = command.get_tex_id()
+            texture = textures.get(number)
             if texture is None:
                 return None
             first, count = command.vtx_offset, command.elem_count
@@ -48,14 +50,8 @@ def pieces_of(data: imgui.ImDrawData, size: tuple[int, int]) -> Sequence[Piece] 
             own_indices = _memory(indices.data_address() + _INDEX_BYTES * command.idx_offset, _INDEX_BYTES * count)
             placed = _in_pixels(own_corners, data.display_pos, data.framebuffer_scale)
             box = _box(command.clip_rect, data.display_pos, data.framebuffer_scale, size[1])
-            pieces.append(Piece(box, texture, placed, own_indices))
+            pieces.append(Piece(box, number, texture, placed, own_indices))
     return pieces
-
-
-def paint(pieces: Sequence[Piece], sheet: ByteArray) -> None:
-    """Paint them over what is in the sheet, (H, W, 4), blue first."""
-    for piece in pieces:
-        painting.triangles(sheet, piece.box, piece.texture, piece.corners, piece.indices)
 
 
 def _textures(data: imgui.ImDrawData) -> dict[int, Texture] | None:

@@ -18,7 +18,7 @@ from imgui_bundle import ImVec2, imgui
 import glfw  # isort: skip
 
 from app import frametimes
-from app.canvas import Target, windowed_context
+from app.canvas import Target, draws_in_software, windowed_context
 from app.controller import Controller
 from app.display_loss import on_display_loss
 from app.engine import Engine, ModelChoice
@@ -28,6 +28,7 @@ from app.interface import Interface
 from app.opening import DEFAULT_MODEL, make_engine, offered_models, open_by_content, preview, synthesis_process, thumbnail_store
 from app.pacing import Pace
 from app.settings import SettingsFile, WindowPlace, default_path
+from app.shared_window import SharedWindow
 from app.surroundings import Keeping, Surroundings
 from app.window_place import fitted
 from assets import sample_path
@@ -190,6 +191,7 @@ class _Window:
         self._frame_at = time.monotonic()  # by imgui's time
         self._cursor: int | None = None  # shape of the mouse that has been set
         self._interface: Interface | None = None
+        self._shared: SharedWindow | None = None
         self._woken = threading.Event()  # by a worker, or by another size of the window, since the last look
         self._touched_at = 0.0  # last event of mouse or keyboard
         self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
@@ -209,13 +211,24 @@ class _Window:
         ):
             follow(self._window, self._resized)
         self._resized()
-        glfw.set_window_refresh_callback(self._window, lambda _: self._woken.set())  # a part of it has come into sight
+        glfw.set_window_refresh_callback(self._window, self._uncovered)
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
 
     def attach(self, controller: Controller, surroundings: Surroundings) -> None:
         """Show this controller's light field from now on."""
-        self._interface = Interface(controller, self._context, self._scale, surroundings, self._load)
+        self._shared = self._shared_window() if draws_in_software(self._context) else None
+        self._interface = Interface(controller, self._context, self._scale, surroundings, self._load, self._shared)
+
+    def _shared_window(self) -> SharedWindow | None:
+        """What paints straight into the window; None where there is no such way."""
+        if not hasattr(glfw, "get_x11_display"):
+            return None
+        display, number = glfw.get_x11_display(), glfw.get_x11_window(self._window)
+        try:
+            return SharedWindow(display, number) if display and number else None  # there are none on Wayland
+        except OSError:
+            return None
 
     def place(self) -> WindowPlace:
         """Where the window is; of a maximised one where it would go back to."""
@@ -291,8 +304,8 @@ class _Window:
         interface = self._at_hand
         interface.set_scale(self._scale)
         self._new_frame()
-        interface.draw(Target(self._target, size), time.monotonic())
-        glfw.swap_buffers(self._window)
+        if interface.draw(Target(self._target, size), time.monotonic()):
+            glfw.swap_buffers(self._window)
         self._name_window(interface.controller)
 
     def _new_frame(self) -> None:
@@ -317,6 +330,8 @@ class _Window:
         """Give the window and everything in it back."""
         if self._interface is not None:
             self._interface.shutdown()
+        if self._shared is not None:
+            self._shared.close()
         imgui.backends.glfw_shutdown()
         imgui.destroy_context()
         glfw.terminate()
@@ -356,6 +371,12 @@ class _Window:
         content = max(glfw.get_window_content_scale(self._window))
         self._units = glfw.get_window_size(self._window)
         self._scale = content * max(self._units[0], 1) / max(self._size[0], 1) or 1.0
+
+    def _uncovered(self, *_: object) -> None:
+        """A part of the window has come into sight."""
+        self._woken.set()
+        if self._interface is not None:
+            self._interface.uncover()
 
     def _name_window(self, controller: Controller) -> None:
         title = f"{controller.name} \N{EN DASH} {TITLE}" if controller.name else TITLE

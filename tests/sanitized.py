@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 COMPILER = "gcc"
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer", "-g")
 TESTS = {
-    "app.painting._painting": ["test_painting", "test_panel_painting"],
+    "app.painting._painting": ["test_painting", "test_panel_painting", "test_repainting"],
     "lfcore._kernels": [
         "test_amx",
         "test_compact",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,13 @@ import numpy.typing as npt
 import pytest
 from imgui_bundle import ImVec2, imgui
 
-from app import panel_painting
+from app import panel_painting, repainting
 from app.canvas import Canvas
+from app.geometry import Zoom
 from app.interface import Interface
 from app.offscreen import Offscreen
 from app.painting import CORNER_BYTES, Box, Texture, triangles
+from app.state import Look
 from lfcore.synthesis import ByteArray
 
 SIZE = (48, 64)  # height, width
@@ -59,7 +62,7 @@ def corners_of_rectangle(left: float, top: float, right: float, bottom: float) -
 def test_a_rectangle_covers_the_pixels_whose_centres_lie_in_it(order: tuple[int, ...]) -> None:
     sheet = grey()
     places = corners_of_rectangle(10.5, 7.4, 30.5, 20.6)
-    triangles(sheet, ALL, WHITE, corners_of(places, (200, 10, 30, 255)), indices_of(*order))
+    triangles(sheet, [ALL], WHITE, corners_of(places, (200, 10, 30, 255)), indices_of(*order))
     expected = grey()
     expected[7:21, 10:30] = (30, 10, 200, 255)  # of those on its edges the ones on the left
     np.testing.assert_array_equal(sheet[..., :3], expected[..., :3])
@@ -68,7 +71,7 @@ def test_a_rectangle_covers_the_pixels_whose_centres_lie_in_it(order: tuple[int,
 @pytest.mark.parametrize("cover", [0, 1, 77, 128, 254, 255])
 def test_a_colour_covers_as_much_as_it_says(cover: int) -> None:
     sheet = grey()
-    triangles(sheet, ALL, WHITE, corners_of(corners_of_rectangle(0, 0, 64, 48), (250, 130, 0, cover)), RECTANGLE)
+    triangles(sheet, [ALL], WHITE, corners_of(corners_of_rectangle(0, 0, 64, 48), (250, 130, 0, cover)), RECTANGLE)
     expected = np.rint(100 + (np.array([0, 130, 250]) - 100.0) * cover / 255)
     np.testing.assert_allclose(sheet[..., :3], np.broadcast_to(expected, (*SIZE, 3)), atol=1)
 
@@ -85,7 +88,7 @@ def test_a_fan_covers_no_pixel_twice_and_leaves_none_out(scale: float) -> None:
         places = np.round(places * 256) / 256  # so that places are exact
         fan = [name for i in range(1, count - 1) for name in (0, i, i + 1)]
         sheet = grey()
-        triangles(sheet, ALL, WHITE, corners_of(places, (255, 255, 255, 128)), indices_of(*fan))
+        triangles(sheet, [ALL], WHITE, corners_of(places, (255, 255, 255, 128)), indices_of(*fan))
         y, x = np.mgrid[: SIZE[0], : SIZE[1]] + 0.5
         sides = [
             (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for a, b in zip(places, np.roll(places, -1, 0), strict=True)
@@ -99,7 +102,7 @@ def test_a_fan_covers_no_pixel_twice_and_leaves_none_out(scale: float) -> None:
 def test_colours_run_evenly_between_corners() -> None:
     sheet = grey(0)
     colours = [(0, 0, 0, 255), (255, 0, 0, 255), (255, 255, 0, 255), (0, 255, 0, 255)]
-    triangles(sheet, ALL, WHITE, corners_of(corners_of_rectangle(0, 0, 64, 48), colours), RECTANGLE)
+    triangles(sheet, [ALL], WHITE, corners_of(corners_of_rectangle(0, 0, 64, 48), colours), RECTANGLE)
     red = 255 * (np.arange(64) + 0.5) / 64
     green = 255 * (np.arange(48) + 0.5) / 48
     np.testing.assert_allclose(sheet[..., 2], np.broadcast_to(red, SIZE), atol=1)
@@ -113,7 +116,7 @@ def test_a_texture_of_the_same_size_is_copied(white: bool) -> None:
     sheet = grey(0)
     of_texture = [(0, 0), (1, 0), (1, 1), (0, 1)]
     corners = corners_of(corners_of_rectangle(5, 6, 25, 18), of_texture=of_texture)
-    triangles(sheet, ALL, Texture(pixels, white), corners, RECTANGLE)
+    triangles(sheet, [ALL], Texture(pixels, white), corners, RECTANGLE)
     expected = pixels[..., 2::-1] if not white else np.broadcast_to(pixels[..., 3:], (12, 20, 3))
     np.testing.assert_array_equal(sheet[6:18, 5:25, :3], expected)
 
@@ -121,7 +124,7 @@ def test_a_texture_of_the_same_size_is_copied(white: bool) -> None:
 def test_nothing_outside_the_box_is_painted() -> None:
     for box in (Box(10, 5, 20, 9), Box(-5, -5, 3, 4), Box(60, 40, 100, 100), Box(9, 9, 9, 20), Box(20, 20, 10, 10)):
         sheet, expected = grey(), grey()
-        triangles(sheet, box, WHITE, corners_of(corners_of_rectangle(-1e9, -1e9, 1e9, 1e9)), RECTANGLE)
+        triangles(sheet, [box], WHITE, corners_of(corners_of_rectangle(-1e9, -1e9, 1e9, 1e9)), RECTANGLE)
         expected[max(box.top, 0) : max(box.bottom, 0), max(box.left, 0) : max(box.right, 0)] = 255
         np.testing.assert_array_equal(sheet[..., :3], expected[..., :3])
 
@@ -130,16 +133,16 @@ def test_nothing_outside_the_box_is_painted() -> None:
 def test_places_that_are_no_numbers_harm_nothing_else(place: float) -> None:
     sheet = grey()
     places = np.array([(5, 5), (20, 5), (place, 20), (40, 10), (50, 10), (50, 20)], np.float32)
-    triangles(sheet, ALL, WHITE, corners_of(places, of_texture=(place, place)), indices_of(0, 1, 2, 3, 4, 5))
+    triangles(sheet, [ALL], WHITE, corners_of(places, of_texture=(place, place)), indices_of(0, 1, 2, 3, 4, 5))
     assert (sheet[15, 49, :3] == 255).all() and (sheet[40, 60, :3] == 100).all()
 
 
 def test_a_corner_that_is_not_there_is_refused() -> None:
     sheet = grey()
     with pytest.raises(ValueError, match="not there"):
-        triangles(sheet, ALL, WHITE, corners_of(corners_of_rectangle(0, 0, 9, 9)), indices_of(0, 1, 4))
+        triangles(sheet, [ALL], WHITE, corners_of(corners_of_rectangle(0, 0, 9, 9)), indices_of(0, 1, 4))
     with pytest.raises(ValueError, match="without pixels"):
-        triangles(sheet, ALL, Texture(np.empty((0, 4, 4), np.uint8), True), corners_of(np.zeros((3, 2))), indices_of(0, 1, 2))
+        triangles(sheet, [ALL], Texture(np.empty((0, 4, 4), np.uint8), True), corners_of(np.zeros((3, 2))), indices_of(0, 1, 2))
     assert (sheet == 100).all()
 
 
@@ -192,7 +195,7 @@ def test_triangles_are_those_of_opengl(gl: Any, white: bool) -> None:
             corners[:, 16:] = (200, 150, 30, 180)
         indices = np.arange(count, dtype=np.uint32)
         sheet = grey()
-        triangles(sheet, ALL, Texture(texture, white), corners, indices)
+        triangles(sheet, [ALL], Texture(texture, white), corners, indices)
         apart = abs(sheet[..., 2::-1].astype(np.int64) - drawn(gl, texture, corners, indices))
         # A centre that lies on a side up to rounding, or a texture that is sampled much smaller.
         assert np.quantile(apart, 0.99) <= 2 and (apart > 3).mean() < 0.004, (turn, apart.max())
@@ -205,13 +208,13 @@ def test_triangles_are_those_of_opengl(gl: Any, white: bool) -> None:
 def painted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many pieces each frame that was painted consisted of."""
     counts: list[int] = []
-    paint = panel_painting.paint
+    paint = repainting.paint
 
-    def counted(pieces: Any, sheet: ByteArray) -> None:
+    def counted(sheet: ByteArray, boxes: Any, layers: Any, pieces: Any) -> None:
         counts.append(len(pieces))
-        paint(pieces, sheet)
+        paint(sheet, boxes, layers, pieces)
 
-    monkeypatch.setattr(panel_painting, "paint", counted)
+    monkeypatch.setattr(repainting, "paint", counted)
     return counts
 
 
@@ -264,3 +267,43 @@ def test_a_window_is_drawn_where_not_all_of_it_can_be_painted(
     count = len(painted)
     viewer.frame()
     assert len(painted) == count and len(shown) == 1
+
+
+def test_in_a_window_that_goes_on_each_frame_is_as_if_all_of_it_had_been_painted(
+    viewer: Offscreen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = viewer.interface.controller.state
+    sheets: list[ByteArray] = []
+    shares: list[float] = []
+    paint = repainting.paint
+
+    def checked(sheet: ByteArray, boxes: Sequence[Box], layers: Any, pieces: Any) -> None:
+        paint(sheet, boxes, layers, pieces)
+        anew = np.zeros_like(sheet)
+        paint(anew, [Box(0, 0, sheet.shape[1], sheet.shape[0])], layers, pieces)
+        np.testing.assert_array_equal(sheet, anew)
+        sheets.append(anew)
+        shares.append(sum((box.right - box.left) * (box.bottom - box.top) for box in boxes) / (sheet.shape[0] * sheet.shape[1]))
+
+    monkeypatch.setattr(repainting, "paint", checked)
+    steps: list[Callable[[], object]] = [
+        *(lambda u=u: state.move_to(u, 0.4) for u in (0.5, 0.52, 0.55, 0.7)),
+        *(lambda scale=scale: setattr(state, "zoom", Zoom(scale)) for scale in (1.0, 2.5, 5.0)),
+        lambda: setattr(state, "panel", False),
+        lambda: setattr(state, "look", Look.DISPARITY),  # which is drawn
+        lambda: state.move_to(0.6, 0.6),
+        lambda: setattr(state, "look", Look.SYNTHESIS),
+        lambda: setattr(state, "panel", True),
+        lambda: setattr(state, "help", True),
+        lambda: setattr(state, "help", False),
+    ]
+    for step in steps:
+        step()
+        for _ in range(4):
+            count = len(sheets)
+            frame = viewer.frame()
+            assert state.look is Look.SYNTHESIS or len(sheets) == count
+            if len(sheets) > count:
+                np.testing.assert_array_equal(frame, sheets[-1][..., 2::-1])  # all of it has come to the window
+    assert len(sheets) > 30
+    assert min(shares) < 0.05 < 0.9 < max(shares)  # times in the status bar, and all of it after a frame that was drawn

@@ -23,7 +23,7 @@ class Recorder:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, moved: Point | None) -> None:
         self.order: list[tuple[str, Point]] = []
-        prepare, draw, sheet, pad = Canvas.prepare, Canvas.draw, Canvas.sheet, viewpoint_pad.draw
+        prepare, draw, beneath, pad = Canvas.prepare, Canvas.draw, Canvas.beneath, viewpoint_pad.draw
 
         def recorded_prepare(canvas: Canvas, frame: Frame) -> bool:
             self.order.append(("made", frame.viewpoint))
@@ -33,9 +33,9 @@ class Recorder:
             self.order.append(("shown", frame.viewpoint))
             draw(canvas, frame, *where)
 
-        def recorded_sheet(canvas: Canvas, frame: Frame, *where: Any) -> Any:  # of a window that is painted
+        def recorded_beneath(canvas: Canvas, frame: Frame, *where: Any) -> Any:  # of a window that is painted
             self.order.append(("shown", frame.viewpoint))
-            return sheet(canvas, frame, *where)
+            return beneath(canvas, frame, *where)
 
         def moving_pad(state: ViewState, *others: Any) -> Any:
             self.order.append(("panels", (state.u, state.v)))
@@ -46,7 +46,7 @@ class Recorder:
 
         monkeypatch.setattr(Canvas, "prepare", recorded_prepare)
         monkeypatch.setattr(Canvas, "draw", recorded_draw)
-        monkeypatch.setattr(Canvas, "sheet", recorded_sheet)
+        monkeypatch.setattr(Canvas, "beneath", recorded_beneath)
         monkeypatch.setattr(viewpoint_pad, "draw", moving_pad)
 
 

@@ -2,7 +2,7 @@
 
 from app.canvas.canvas import Canvas
 from app.canvas.contexts import draws_in_software, standalone_context, standalone_functions, windowed_context
-from app.canvas.copying import WindowCopy
+from app.canvas.copying import Sheets, WindowCopy
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.magnifier import Colours
 from app.canvas.placing import Pixels
@@ -14,6 +14,7 @@ __all__ = [
     "Colours",
     "Frame",
     "Pixels",
+    "Sheets",
     "Target",
     "WindowCopy",
     "draws_in_software",

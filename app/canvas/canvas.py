@@ -16,8 +16,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from app.canvas.beneath import Enlarged, Fill
 from app.canvas.compared import Compared
-from app.canvas.copying import WindowCopy, enlarge
+from app.canvas.copying import Sheets, WindowCopy
 from app.canvas.frame import BACKGROUND, Frame, Target
 from app.canvas.inside import Inside
 from app.canvas.magnifier import Colours, Magnifier
@@ -32,6 +33,7 @@ from app.canvas.textures import TEXTURE_TYPES, Textures, make_texture
 from app.comparison import Source
 from app.geometry import Placement, Point, Rect, Size
 from app.layout import Strips
+from app.painting import Box
 from app.state import CARRIED, Look, Reach
 from app.tone import Tone
 from lfcore.errors import InputError
@@ -98,6 +100,7 @@ class Canvas:
         # Bound before framebuffers are released: moderngl would otherwise go on binding one that is gone.
         self._resting_place = context.simple_framebuffer((1, 1))
         self._makers: _Makers | None = None
+        self._light_fields = 0  # that have been taken
         self.unfinished = False  # the frame prepared last becomes better with the next ones
         self.painted = False  # it has been made by the processor's own code
         self._exhibit: moderngl.Texture | None = None  # what is shown in place of a light field
@@ -114,6 +117,7 @@ class Canvas:
                 f"open a light field with smaller views."
             )
         self.clear()
+        self._light_fields += 1
         textures = Textures(self.context, corners, self._picture_type)
         synthesized = self._synthesizes(self.passes, textures, self._reach)
         self._makers = _Makers.of(self.context, self.passes, textures, synthesized)
@@ -287,28 +291,24 @@ class Canvas:
         else:
             self._magnifier.image(made, frame.dim, target, area, placement)
 
-    def sheet(
+    def beneath(
         self, frame: Frame, size: Size, rectangles: Sequence[Ground], background: Colour, area: Rect, placement: Placement
-    ) -> ByteArray:
-        """What `begin` and `draw` would make of a window of this (width, height), in the processor's memory: (H, W, 4), blue
-        first. Only for what is `copied`."""
-        made, copied, copy = self._made(frame), self.copied(frame, area, placement), self._copy
-        assert isinstance(made, Painted) and copied is not None and copy is not None
-        sheet = copy.sheet(size)
-        whole = sheet.view(np.uint32)[..., 0]  # (H, W): filled much faster than byte by byte
-        for ground, colour in _grounds(rectangles, background, copied, size):
-            left, top, right, bottom = _rounded(ground)
-            pixel = np.array([*(round(255 * value) for value in reversed(colour)), 255], np.uint8)
-            whole[max(top, 0) : bottom, max(left, 0) : right] = pixel.view(np.uint32)
-        inside = sheet[copied.y : copied.y + copied.height, copied.x : copied.x + copied.width]
-        if inside.size:
-            enlarge(made.pixels, copied, placement, inside)
-        return sheet
+    ) -> list[Fill | Enlarged]:
+        """What `begin` and `draw` would fill a window of this (width, height) with, one after the other. Only for what is
+        `copied`."""
+        made, copied = self._made(frame), self.copied(frame, area, placement)
+        assert isinstance(made, Painted) and copied is not None
+        layers: list[Fill | Enlarged] = [
+            Fill(Box(*_rounded(ground)), colour) for ground, colour in _grounds(rectangles, background, copied, size)
+        ]
+        seen = Box(copied.x, copied.y, copied.x + copied.width, copied.y + copied.height)
+        number = self._light_fields, self._at_hand.textures.made
+        return [*layers, Enlarged(seen, made.pixels, placement, number)]
 
-    def show(self, sheet: ByteArray, target: Target) -> None:
-        """Make the target, a window, what the sheet is, which is the one that was made last."""
+    def sheets(self, target: Target) -> Sheets:
+        """Of the target, which is a window. Only where something is `copied`."""
         assert self._copy is not None
-        self._copy.show(sheet, target)
+        return self._copy.into(target)
 
     def _copy_for(self, frame: Frame, placement: Placement) -> WindowCopy | None:
         """What copies the frame's picture, if it has been painted; None where it has to be drawn."""

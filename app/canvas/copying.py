@@ -8,8 +8,9 @@ offers neither that order nor copies upside down, so OpenGL is called directly.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from app.canvas.frame import Target
 from app.canvas.placing import Pixels, sampling, visible
 from app.geometry import Placement, Rect, Size
-from app.painting import Places, enlarged
+from app.painting import Box, Places, enlarged
 from lfcore.synthesis import ByteArray
 
 _TEXTURE_2D, _READ_FRAMEBUFFER, _DRAW_FRAMEBUFFER, _COLOR_ATTACHMENT = 0x0DE1, 0x8CA8, 0x8CA9, 0x8CE0
@@ -46,6 +47,20 @@ _SAMPLED: Mapping[str, Callable[[npt.NDArray[np.floating], int], Places]] = {
 }
 
 
+class Sheets(Protocol):
+    """Memory in which a whole window is painted, and the way from there into the window."""
+
+    def keeps(self, size: Size) -> bool:
+        """Whether there is still in the next sheet what was shown last, which had this (width, height)."""
+
+    def sheet(self, size: Size) -> ByteArray:
+        """Pixels (H, W, 4), blue first, that `show` takes."""
+
+    def show(self, sheet: ByteArray, boxes: Sequence[Box]) -> None:
+        """The sheet that was asked for last into the window. boxes: where it is another one than what it `keeps`; all of it
+        where it keeps nothing."""
+
+
 class WindowCopy:
     """Puts pictures into windows. The window's GL context must be current.
 
@@ -55,6 +70,7 @@ class WindowCopy:
     def __init__(self, load: Callable[[str], int]) -> None:
         self._gl = {name: ctypes.CFUNCTYPE(None, *types)(load(name)) for name, types in _FUNCTIONS.items()}
         self._size: Size = (0, 0)  # that there is room for
+        self._shown: Size | None = None  # of the sheet that is in it
         self._room: ByteArray = np.empty(0, np.uint8)
         self._texture, self._framebuffer = _UNSIGNED(), _UNSIGNED()
 
@@ -67,26 +83,41 @@ class WindowCopy:
         """A picture (H, W, 4) into its place in the window, as Magnifier.image draws it."""
         inside = visible((picture.shape[1], picture.shape[0]), area, placement)
         if min(inside.width, inside.height) > 0:
-            seen = self.sheet((inside.width, inside.height))
+            size = inside.width, inside.height
+            seen = self.sheet(size)
             enlarge(picture, inside, placement, seen)
-            self.show(seen, target, (inside.x, inside.y))
+            self._hand_over(seen, Box(0, 0, *size))
+            self._copy(target, (inside.x, inside.y), size)
+            self._shown = None
+
+    def into(self, target: Target) -> Sheets:
+        """Sheets for the window that the target is."""
+        return _Into(self, target)
+
+    def keeps(self, size: Size) -> bool:
+        """See Sheets."""
+        return self._shown == size
 
     def sheet(self, size: Size) -> ByteArray:
-        """Memory for pixels (H, W, 4), blue first, that `show` takes; whatever was in it before."""
+        """Memory for pixels (H, W, 4), blue first; whatever was in it before."""
         self._make_room(size)
         return self._room[: 4 * size[0] * size[1]].reshape(size[1], size[0], 4)
 
-    def show(self, sheet: ByteArray, target: Target, corner: Size = (0, 0)) -> None:
-        """The sheet that was asked for last into the window, its first pixel there."""
-        self._hand_over(sheet)
-        self._copy(target, corner, (sheet.shape[1], sheet.shape[0]))
+    def show(self, sheet: ByteArray, boxes: Sequence[Box], target: Target) -> None:
+        """See Sheets."""
+        for box in boxes:
+            self._hand_over(sheet, box)
+        self._shown = sheet.shape[1], sheet.shape[0]
+        self._copy(target, (0, 0), self._shown)
 
-    def _hand_over(self, pixels: ByteArray) -> None:
-        height, width = pixels.shape[:2]
+    def _hand_over(self, pixels: ByteArray, box: Box) -> None:
+        first = pixels[box.top :, box.left :]
+        size = box.right - box.left, box.bottom - box.top
         self._gl["glBindTexture"](_TEXTURE_2D, self._texture)
         self._gl["glPixelStorei"](_UNPACK_ALIGNMENT, 4)
+        self._gl["glPixelStorei"](_UNPACK_ROW_LENGTH, pixels.shape[1])
+        self._gl["glTexSubImage2D"](_TEXTURE_2D, 0, box.left, box.top, *size, _BGRA, _UNSIGNED_BYTE, first.ctypes.data)
         self._gl["glPixelStorei"](_UNPACK_ROW_LENGTH, 0)
-        self._gl["glTexSubImage2D"](_TEXTURE_2D, 0, 0, 0, width, height, _BGRA, _UNSIGNED_BYTE, pixels.ctypes.data)
 
     def _make_room(self, size: Size) -> None:
         """For pictures of this size: memory, and a texture that is kept as windows are, blue first. Where no order is asked
@@ -115,6 +146,26 @@ class WindowCopy:
         places = (0, 0, width, height, left, lowest - top, left + width, lowest - top - height)
         self._gl["glBlitFramebuffer"](*places, _COLOR_BUFFER_BIT, _NEAREST)
         target.framebuffer.use()  # as moderngl believes it to be
+
+
+@dataclass(frozen=True)
+class _Into:
+    """Sheets that OpenGL copies into one window."""
+
+    copy: WindowCopy
+    target: Target
+
+    def keeps(self, size: Size) -> bool:
+        """See Sheets."""
+        return self.copy.keeps(size)
+
+    def sheet(self, size: Size) -> ByteArray:
+        """See Sheets."""
+        return self.copy.sheet(size)
+
+    def show(self, sheet: ByteArray, boxes: Sequence[Box]) -> None:
+        """See Sheets."""
+        self.copy.show(sheet, boxes, self.target)
 
 
 def enlarge(picture: ByteArray, inside: Pixels, placement: Placement, out: ByteArray) -> None:

@@ -7,6 +7,7 @@ Optional, as lfcore.kernels is: where nothing was compiled, shaders do all of it
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ Memory = npt.NDArray[np.generic] | ctypes.Array[ctypes.c_char]  # that lies in o
 
 CHANNELS = 4  # bytes of a pixel
 MARGIN = 3  # pixels by which a spread picture is continued; as in carried.c
-_FUNCTIONS = ("carried", "spread", "in_bytes", "mixed", "enlarged", "triangles")
+_FUNCTIONS = ("carried", "spread", "in_bytes", "mixed", "enlarged", "triangles", "marked")
 
 _PAINTING = extension("app.painting._painting", _FUNCTIONS)
 
@@ -127,6 +128,12 @@ class Box:
     right: int
     bottom: int
 
+    def within(self, other: Box) -> Box | None:
+        """What both share; None where that is nothing."""
+        left, top = max(self.left, other.left), max(self.top, other.top)
+        right, bottom = min(self.right, other.right), min(self.bottom, other.bottom)
+        return Box(left, top, right, bottom) if left < right and top < bottom else None
+
 
 CORNER_BYTES = 20  # place (x, y) in pixels, place in the texture (u, v) of 0 to 1: float32; colour: red first, then covering
 
@@ -139,12 +146,24 @@ class Texture:
     white: bool
 
 
-def triangles(sheet: ByteArray, box: Box, texture: Texture, corners: Memory, indices: Memory) -> None:
-    """Triangles blended over a sheet within a box, as graphics draw them: colours times a texture between its pixels.
+def triangles(sheet: ByteArray, boxes: Sequence[Box], texture: Texture, corners: Memory, indices: Memory) -> None:
+    """Triangles blended over a sheet within boxes, as graphics draw them: colours times a texture between its pixels.
 
-    sheet: (H, W, 4), blue first, as windows are kept. corners: CORNER_BYTES each. indices: uint32, three corners a triangle.
-    Raises ValueError for a corner that is not there.
+    sheet: (H, W, 4), blue first, as windows are kept. boxes: no two share a pixel. corners: CORNER_BYTES each. indices: uint32,
+    three corners a triangle. Raises ValueError for a corner that is not there.
     """
     assert _PAINTING is not None
-    bounds, filling = (box.left, box.top, box.right, box.bottom), texture.pixels
-    _PAINTING.triangles(*sheet.shape[:2], sheet, bounds, *filling.shape[:2], filling, texture.white, corners, indices)
+    bounds = np.array([(box.left, box.top, box.right, box.bottom) for box in boxes], np.int64)
+    filling = texture.pixels
+    of_texture = (*filling.shape[:2], filling, texture.white)
+    _PAINTING.triangles(*sheet.shape[:2], sheet, len(boxes), bounds, *of_texture, corners, indices)
+
+
+def marked(marks: npt.NDArray[np.uint64], side: int, box: Box, beneath: int, corners: Memory, indices: Memory) -> None:
+    """Let the mark of every cell that triangles touch within a box follow from what they look like, and from what it was.
+
+    marks: (rows, columns), changed; side: of a cell, in pixels; beneath: 0 to 2**64 - 1, stands for whatever else counts;
+    corners and indices as for `triangles`. Raises ValueError for a corner that is not there.
+    """
+    assert _PAINTING is not None
+    _PAINTING.marked(*marks.shape, side, marks, (box.left, box.top, box.right, box.bottom), beneath, corners, indices)

@@ -8,6 +8,7 @@ PyObject *in_bytes(PyObject *module, PyObject *arguments); /* in_bytes.c */
 PyObject *mixed(PyObject *module, PyObject *arguments); /* mixed.c */
 PyObject *enlarged(PyObject *module, PyObject *arguments); /* enlarged.c */
 PyObject *triangles(PyObject *module, PyObject *arguments); /* triangles.c */
+PyObject *marked(PyObject *module, PyObject *arguments); /* marked.c */
 
 static PyMethodDef methods[] = {
     {"carried", carried, METH_VARARGS, NULL},
@@ -16,6 +17,7 @@ static PyMethodDef methods[] = {
     {"mixed", mixed, METH_VARARGS, NULL},
     {"enlarged", enlarged, METH_VARARGS, NULL},
     {"triangles", triangles, METH_VARARGS, NULL},
+    {"marked", marked, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };
 

@@ -1,22 +1,12 @@
 /* Triangles as OpenGL draws them, blended over what is there: what imgui's panels consist of. */
-#include "painting.h"
+#include "corners.h"
 
 #define PART_OF_PIXEL 256 /* corners lie at multiples of it, as software rasterisers have them */
-
-/* As imgui lays it out; the colour red first, its last byte how much it covers. */
-typedef struct {
-    float x, y, u, v;
-    uint32_t colour;
-} Corner;
 
 typedef struct {
     uint32_t *pixels; /* blue first */
     Py_ssize_t width, height;
 } Sheet;
-
-typedef struct {
-    Py_ssize_t left, top, right, bottom;
-} Box;
 
 typedef struct {
     const uint32_t *pixels; /* red first */
@@ -144,8 +134,6 @@ typedef struct {
     const Corner *of[3];
     int32_t at[3][2]; /* places of the corners in parts of a pixel; inside is to the right of the way round */
 } Triangle;
-
-#define FARTHEST 1000000.0f /* px: nothing that is seen lies there, and products of places fit into 64 bits */
 
 PART int32_t parts_of(float place) { return (int32_t)lrintf(bounded(place, -FARTHEST, FARTHEST) * PART_OF_PIXEL); }
 
@@ -314,23 +302,37 @@ PART void paint_rectangle(const Sheet *sheet, Box box, const Texture *texture, c
         paint_span(sheet->pixels + y * sheet->width, columns, y, &filling, texture);
 }
 
+/* What is painted of a sheet: boxes within it, of which no two share a pixel. */
+typedef struct {
+    Sheet sheet;
+    const Box *boxes;
+    Py_ssize_t count;
+} Painting;
+
+PART int reaches(const Painting *p, Box bounds) {
+    for (Py_ssize_t k = 0; k < p->count; ++k)
+        if (holds_pixels(shared_by(bounds, p->boxes[k]))) return 1;
+    return 0;
+}
+
 MANY_PROCESSORS
-static void paint_all(const Sheet *sheet, Box box, const Texture *texture, const Corner *corners, const uint32_t *indices,
-                      Py_ssize_t count) {
+static void paint_all(const Painting *p, const Texture *texture, const Corner *corners, const uint32_t *indices, Py_ssize_t count) {
     for (Py_ssize_t i = 0; i + 3 <= count; i += 3) {
         const Corner *a = corners + indices[i], *b = corners + indices[i + 1], *c = corners + indices[i + 2];
         Triangle t;
-        if (!set_up(&t, a, b, c)) continue;
+        if (!reaches(p, bounds_of(a, b, c)) || !set_up(&t, a, b, c)) continue;
         const int of_two = i + 6 <= count && indices[i + 3] == indices[i] && indices[i + 4] == indices[i + 2];
-        if (of_two && is_rectangle(a, b, c, corners + indices[i + 5])) {
-            paint_rectangle(sheet, box, texture, &t, a, c);
-            i += 3;
-        } else
-            paint_triangle(sheet, box, texture, &t);
+        const int is_half = of_two && is_rectangle(a, b, c, corners + indices[i + 5]);
+        for (Py_ssize_t k = 0; k < p->count; ++k)
+            if (is_half)
+                paint_rectangle(&p->sheet, p->boxes[k], texture, &t, a, c);
+            else
+                paint_triangle(&p->sheet, p->boxes[k], texture, &t);
+        if (is_half) i += 3;
     }
 }
 
-static int lie_among(const uint32_t *indices, Py_ssize_t count, Py_ssize_t corners) {
+int lie_among(const uint32_t *indices, Py_ssize_t count, Py_ssize_t corners) {
     for (Py_ssize_t i = 0; i < count; ++i)
         if ((Py_ssize_t)indices[i] >= corners) {
             PyErr_SetString(PyExc_ValueError, "a triangle names a corner that is not there");
@@ -339,28 +341,42 @@ static int lie_among(const uint32_t *indices, Py_ssize_t count, Py_ssize_t corne
     return 1;
 }
 
+/* Copies of boxes, as far as they lie within the sheet; else an exception is set. */
+static Box *within_sheet(const Py_buffer *boxes, Py_ssize_t count, const Sheet *sheet) {
+    Box *copies = malloc((size_t)(count + 1) * sizeof(Box));
+    if (!copies) PyErr_NoMemory();
+    for (Py_ssize_t k = 0; copies && k < count; ++k) {
+        int64_t sides[4];
+        memcpy(sides, (const int64_t *)boxes->buf + 4 * k, sizeof sides);
+        copies[k] = shared_by((Box){sides[0], sides[1], sides[2], sides[3]}, (Box){0, 0, sheet->width, sheet->height});
+    }
+    return copies;
+}
+
 PyObject *triangles(PyObject *Py_UNUSED(module), PyObject *arguments) {
-    Sheet sheet;
-    Box box;
+    Painting p;
     Texture texture;
-    Py_buffer pixels, of_texture, corners, indices;
-    if (!PyArg_ParseTuple(arguments, "nnw*(nnnn)nny*py*y*", &sheet.height, &sheet.width, &pixels, &box.left, &box.top, &box.right,
-                          &box.bottom, &texture.height, &texture.width, &of_texture, &texture.white, &corners, &indices))
+    Py_buffer pixels, boxes, of_texture, corners, indices;
+    if (!PyArg_ParseTuple(arguments, "nnw*ny*nny*py*y*", &p.sheet.height, &p.sheet.width, &pixels, &p.count, &boxes, &texture.height,
+                          &texture.width, &of_texture, &texture.white, &corners, &indices))
         return NULL;
     const Py_ssize_t count = indices.len / (Py_ssize_t)sizeof(uint32_t);
-    const int right = holds(&pixels, sheet.height * sheet.width * CHANNELS) && texture.height > 0 && texture.width > 0 &&
+    Box *copies = NULL;
+    const int right = holds(&pixels, p.sheet.height * p.sheet.width * CHANNELS) && texture.height > 0 && texture.width > 0 &&
                       holds(&of_texture, texture.height * texture.width * CHANNELS) &&
-                      lie_among(indices.buf, count, corners.len / (Py_ssize_t)sizeof(Corner));
+                      holds(&boxes, p.count * 4 * (Py_ssize_t)sizeof(int64_t)) &&
+                      lie_among(indices.buf, count, corners.len / (Py_ssize_t)sizeof(Corner)) &&
+                      (copies = within_sheet(&boxes, p.count, &p.sheet)) != NULL;
     if (right) {
-        sheet.pixels = pixels.buf;
+        p.sheet.pixels = pixels.buf;
+        p.boxes = copies;
         texture.pixels = of_texture.buf;
-        const Box within_sheet = {at_least(box.left, 0), at_least(box.top, 0), at_most(box.right, sheet.width),
-                                  at_most(box.bottom, sheet.height)};
         Py_BEGIN_ALLOW_THREADS
-        paint_all(&sheet, within_sheet, &texture, corners.buf, indices.buf, count);
+        paint_all(&p, &texture, corners.buf, indices.buf, count);
         Py_END_ALLOW_THREADS
     }
-    for (int k = 0; k < 4; ++k) PyBuffer_Release((Py_buffer *[]){&pixels, &of_texture, &corners, &indices}[k]);
+    free(copies);
+    for (int k = 0; k < 5; ++k) PyBuffer_Release((Py_buffer *[]){&pixels, &boxes, &of_texture, &corners, &indices}[k]);
     if (!right) {
         if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "a texture without pixels was handed over");
         return NULL;
