@@ -26,6 +26,8 @@ LARGE = $(foreach name,hci_antinous hci_bicycle hci_pens,$(DATA)/train/$(name))
 ALL = $(DATA)/train $(ILLUM) $(ILLUM) $(LARGE) $(LARGE) $(F01) $(F01)
 # In the second part of the training half of what is drawn comes from the three of the Illum, a seventh from the F01.
 CAPTURES = $(DATA)/train $(foreach n,1 2 3 4 5 6 7 8,$(ILLUM)) $(LARGE) $(foreach n,1 2 3 4,$(F01)) $(DATA)/train/Bikes $(DATA)/train/Bikes
+# What the channels of full are looked at on.
+NARROWING = $(ILLUM) $(LARGE) $(foreach name,Bikes meadow toys bins drainpipe Begonia koala,$(DATA)/train/$(name))
 TRAIN = $(PYTHON) -m app train --val $(DATA)/val --generated 300 --textures $(TEXTURES) --balance 0.75
 FIRST = $(WEIGHTS)/first
 
@@ -51,7 +53,8 @@ weights: $(VENV)/ready $(WEIGHTS)/f01/ready
 	mkdir -p $(FIRST)
 	$(TRAIN) --data $(ALL) --generated-share 0.4 --model realtime --out $(FIRST)/realtime.safetensors --patch 128 --batch 8 --lr 1e-3 --steps 30000 --decay 0.75 --average 0.998 --matching 200 --tones 0.6
 	$(TRAIN) --data $(CAPTURES) --generated-share 0.2 --model realtime --init $(FIRST)/realtime.safetensors --out $(WEIGHTS)/realtime.safetensors --patch 240 --batch 3 --group 1 --lr 8e-4 --steps 6600 --decay 0.85 --average 0.999 --matching 0 --tones 0.3
-	$(TRAIN) --data $(ALL) --generated-share 0.4 --model full --out $(WEIGHTS)/full.safetensors --teacher $(WEIGHTS)/realtime.safetensors --tones 0.5 --patch 100 --batch 4 --lr 1e-3 --steps 37000 --decay 0.7 --average 0.998 --matching 0
+	$(TRAIN) --data $(ALL) --generated-share 0.4 --model full --out $(FIRST)/full.safetensors --teacher $(WEIGHTS)/realtime.safetensors --tones 0.5 --patch 100 --batch 4 --lr 1e-3 --steps 37000 --decay 0.7 --average 0.998 --matching 0
+	$(PYTHON) -m lfcore.training.narrowing $(FIRST)/full.safetensors $(WEIGHTS)/full.safetensors --data $(NARROWING)
 	$(TRAIN) --data $(ALL) --generated-share 0.4 --model single --out $(WEIGHTS)/single.safetensors --patch 100 --batch 4 --lr 1e-3 --steps 24000 --decay 0.5 --average 0.998
 
 $(WEIGHTS)/f01/ready: $(VENV)/ready
