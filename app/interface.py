@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 from imgui_bundle import ImVec4, imgui
 
 from app import painting, panel_painting, panels, repainting, theme
-from app.canvas import Canvas, Colours, Frame, Pixels, Target, WindowCopy, draws_in_software, spread_rasteriser
+from app.canvas import Canvas, Colours, Frame, Pixels, Sheets, Target, WindowCopy, draws_in_software, spread_rasteriser
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
 from app.commands import Action, OpenPath, Request
@@ -28,10 +28,11 @@ from app.engine import Answer
 from app.exhibits import Exhibit
 from app.export_requests import CancelExport, ExportAction, ExportRequest
 from app.gallery import Seen
-from app.geometry import Placement, Point, Rect, place, visible
+from app.geometry import Placement, Point, Rect, Size, place, visible
 from app.layout import Layout, Strips
+from app.panel_painting import Piece
 from app.panes import Pane, arrange
-from app.repainting import Repainting
+from app.repainting import Layer, Repainting
 from app.settings import Theme
 from app.shared_window import SharedWindow
 from app.state import CARRIED, CARRIED_IN_SOFTWARE, Look, Step
@@ -401,14 +402,24 @@ class Interface:
         (pane,) = arrange(self.controller.state, layout.picture)
         grounds, background = _panel_grounds(layout, pixels), _rgb(theme.BACKGROUND)
         layers = self._canvas.beneath(frame, target.size, grounds, background, *self._where(pane, frame, pixels))
-        sheets = self._shared or self._canvas.sheets(target)
-        if not sheets.keeps(target.size):
+        try:
+            self._show(self._shared or self._canvas.sheets(target), target.size, layers, pieces)
+        except OSError as error:  # the X server takes no memory of this size
+            if self._shared is None:
+                raise
+            _log.warning("the window is copied from now on: %s", error)
+            self._shared = None
+            self._show(self._canvas.sheets(target), target.size, layers, pieces)
+        return True
+
+    def _show(self, sheets: Sheets, size: Size, layers: Sequence[Layer], pieces: Sequence[Piece]) -> None:
+        """Paint what has changed of the window, and have it shown."""
+        if not sheets.keeps(size):
             self._repainting.forget()
-        sheet = sheets.sheet(target.size)
-        boxes = self._repainting.outdated(target.size, layers, pieces)
+        sheet = sheets.sheet(size)
+        boxes = self._repainting.outdated(size, layers, pieces)
         repainting.paint(sheet, boxes, layers, pieces)
         sheets.show(sheet, boxes)
-        return True
 
     def _prepare_to_date(self) -> Frame:
         """The frame of the picture, which is made anew where the panels have changed it, or the canvas has taken more since."""

@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app import panel_painting, repainting
 from app.canvas import Canvas
-from app.geometry import Zoom
+from app.geometry import Size, Zoom
 from app.interface import Interface
 from app.offscreen import Offscreen
 from app.painting import CORNER_BYTES, Box, Texture, triangles
@@ -267,6 +267,21 @@ def test_a_window_is_drawn_where_not_all_of_it_can_be_painted(
     count = len(painted)
     viewer.frame()
     assert len(painted) == count and len(shown) == 1
+
+
+def test_where_there_is_no_memory_to_share_the_window_is_copied(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
+    class NoRoom:
+        def keeps(self, size: Size) -> bool:
+            return True
+
+        def sheet(self, size: Size) -> ByteArray:
+            raise OSError("no room")
+
+    before = viewer.settled()
+    monkeypatch.setattr(viewer.interface, "_shared", NoRoom())
+    after = viewer.frame()
+    assert viewer.interface._shared is None and not viewer.interface.controller.messages
+    np.testing.assert_array_equal(after[:-40], before[:-40])  # below: times
 
 
 def test_in_a_window_that_goes_on_each_frame_is_as_if_all_of_it_had_been_painted(

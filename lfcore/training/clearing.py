@@ -14,7 +14,7 @@ from torch import Tensor
 
 from lfcore.models import Model
 from lfcore.networks import PaperStack
-from lfcore.training.revival import inputs_of
+from lfcore.training.revival import stacks_and_inputs
 
 SHARE = 1e-7  # of what a layer's channels bring to the next one's sums, as variance, all that are cleared have together
 
@@ -25,12 +25,7 @@ def clear(model: Model, show: Callable[[], None]) -> int:
 
     show: runs the model over patches. What a channel is there in the mean goes into the biases of the next layer.
     """
-    stacks = [module for module in model.modules() if isinstance(module, PaperStack)]
-    if not stacks:
-        return 0
-    with inputs_of(stacks) as seen:
-        show()
-    return sum(_clear_stack(stack, inputs) for stack, inputs in zip(stacks, seen, strict=True))
+    return sum(_clear_stack(stack, inputs) for stack, inputs in stacks_and_inputs(model, show))
 
 
 def _clear_stack(stack: PaperStack, inputs: list[Tensor]) -> int:

@@ -33,7 +33,7 @@ from lfcore.planesweep import Levels
 from lfcore.training.architectures import Batch, architecture
 from lfcore.training.loop import prepare_scene
 from lfcore.training.patches import PatchConfig, sample_group
-from lfcore.training.revival import inputs_of
+from lfcore.training.revival import stacks_and_inputs
 from lfcore.weights import load_weights, save_weights
 
 SHARE = 3e-4  # of the variance of the next layer's sums, that may be lost
@@ -72,12 +72,7 @@ class Moments:
 @torch.no_grad()
 def narrow(model: Model, show: Callable[[], None]) -> int:
     """Leave channels out of every PaperStack of a model; returns how many. `show` runs the model over patches."""
-    stacks = [module for module in model.modules() if isinstance(module, PaperStack)]
-    if not stacks:
-        return 0
-    with inputs_of(stacks) as seen:
-        show()
-    return sum(_narrow_stack(stack, inputs) for stack, inputs in zip(stacks, seen, strict=True))
+    return sum(_narrow_stack(stack, inputs) for stack, inputs in stacks_and_inputs(model, show))
 
 
 def _narrow_stack(stack: PaperStack, inputs: list[Tensor]) -> int:

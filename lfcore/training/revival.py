@@ -36,12 +36,17 @@ class Surroundings:
 @torch.no_grad()
 def revive(model: Model, around: Surroundings) -> int:
     """Give the dead channels of every PaperStack of a model new weights; returns how many there were."""
+    return sum(_revive_stack(stack, inputs, around) for stack, inputs in stacks_and_inputs(model, around.show))
+
+
+def stacks_and_inputs(model: Model, show: Callable[[], None]) -> list[tuple[PaperStack, list[Tensor]]]:
+    """Each PaperStack of a model, and what it is given while `show` runs, float32; a model without any is not shown."""
     stacks = [module for module in model.modules() if isinstance(module, PaperStack)]
     if not stacks:
-        return 0
+        return []
     with inputs_of(stacks) as seen:
-        around.show()
-    return sum(_revive_stack(stack, inputs, around) for stack, inputs in zip(stacks, seen, strict=True))
+        show()
+    return list(zip(stacks, seen, strict=True))
 
 
 @contextmanager
