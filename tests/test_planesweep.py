@@ -1,4 +1,7 @@
+from functools import cache
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 import torch
 from scenes import plane
@@ -69,14 +72,20 @@ def test_a_batch_is_its_members() -> None:
         torch.testing.assert_close(together[k : k + 1], plane_sweep(luma[:, k : k + 1], offsets, Levels(), window))
 
 
+@cache  # it takes seconds, and is the same for every type and way
+def placed_sweep(count: int, columns: int) -> npt.NDArray[np.floating]:
+    """What the next test expects."""
+    luma, levels, window = random_luma(3, (23, 37), batch=2), Levels(count, -9, 9), Window(2, 21, 1, 1 + columns)
+    return np.stack([slow_sweep(luma[:, k].numpy(), corner_offsets(0.2, 0.6), levels, window) for k in range(2)])
+
+
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
 @pytest.mark.parametrize(("count", "columns"), [(2, 35), (5, 3), (5, 35), (8, 16), (20, 9)])
 def test_the_result_goes_into_the_place_it_is_given_and_nowhere_else(count: int, columns: int, dtype: torch.dtype) -> None:
     """With fewer channels and pixels than are written together, as many, and numbers of them between."""
     luma, levels, window = random_luma(3, (23, 37), batch=2), Levels(count, -9, 9), Window(2, 21, 1, 1 + columns)
     offsets = corner_offsets(0.2, 0.6)
-    batch = [slow_sweep(luma[:, k].numpy(), offsets, levels, window) for k in range(2)]
-    expected = torch.from_numpy(np.stack(batch)).float()  # (2, 2 count, 19, columns)
+    expected = torch.from_numpy(placed_sweep(count, columns)).float()  # (2, 2 count, 19, columns)
     around = torch.full((2, 2 * count + 3, 25, 40), 7.0, dtype=dtype).to(memory_format=torch.channels_last)
     place = around[:, : 2 * count, 4:23, 2 : 2 + columns]
     assert plane_sweep(luma, offsets, levels, window, place) is place
