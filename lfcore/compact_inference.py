@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from lfcore.compact import DEVIATION_SCALE, CompactModel, ResidualBlock, log_nearness
 from lfcore.compact_parts import LOGITS, MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
-from lfcore.layers import Layer, make_layer
+from lfcore.layers import Layer, UnsetConvolution, make_layer
 from lfcore.tuned_stack import Tuning
 
 
@@ -114,7 +114,9 @@ def _by_phase(channels: int) -> Tensor:
 def _joined(first: nn.Conv2d, second: nn.Conv2d) -> nn.Conv2d:
     """Both as one, whose outputs are those of one and then of the other."""
     outputs, (height, width) = first.out_channels + second.out_channels, first.kernel_size
-    joined = nn.utils.skip_init(nn.Conv2d, first.in_channels, outputs, (height, width), padding=first.padding)
+    assert not isinstance(first.padding, str)
+    above, left = first.padding
+    joined = UnsetConvolution(first.in_channels, outputs, (height, width), padding=(above, left))
     assert joined.bias is not None and first.bias is not None and second.bias is not None
     joined.weight.copy_(torch.cat((first.weight, second.weight)))
     joined.bias.copy_(torch.cat((first.bias, second.bias)))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from lfcore.layers import UnsetConvolution
 from lfcore.networks import PaperStack
 
 
@@ -39,7 +40,7 @@ def used_layers(stack: PaperStack) -> UsedLayers:
 def _part(layer: nn.Conv2d, outputs: Tensor, inputs: Tensor) -> nn.Conv2d:
     """A layer's channels alone, in and out."""
     kernel = layer.kernel_size
-    part = nn.utils.skip_init(nn.Conv2d, len(inputs), len(outputs), (kernel[0], kernel[1]))
+    part = UnsetConvolution(len(inputs), len(outputs), (kernel[0], kernel[1]))
     assert part.bias is not None and layer.bias is not None
     with torch.no_grad():
         part.weight.copy_(layer.weight[outputs][:, inputs])

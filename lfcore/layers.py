@@ -7,7 +7,7 @@ from typing import Protocol
 
 import torch
 import torch.nn.functional as F
-from torch import Tensor
+from torch import Tensor, nn
 
 from lfcore import amx, winograd
 
@@ -25,6 +25,14 @@ class Layer(Protocol):
 
     def __call__(self, x: Tensor, *, of_positive: bool = False, plus: Tensor | None = None, positive: bool = False) -> Tensor:
         """The convolution of x, or of ReLU(x) where `of_positive`; `plus` added; then ReLU where `positive`. A new tensor."""
+
+
+class UnsetConvolution(nn.Conv2d):
+    """A convolution whose weights are yet to be set: no random numbers are drawn for them. What torch offers for it
+    (nn.utils.skip_init) loads a library for symbolic mathematics, which took a start half a second and more."""
+
+    def reset_parameters(self) -> None:
+        """Nothing."""
 
 
 class DirectConvolution:

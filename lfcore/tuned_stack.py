@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from lfcore.fourier import LEAST_CHANNELS, FourierConvolution, unchecked
 from lfcore.idle_channels import used_layers
-from lfcore.layers import DirectConvolution, Way, make_layer
+from lfcore.layers import DirectConvolution, UnsetConvolution, Way, make_layer
 from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Levels, Window
 
@@ -157,7 +157,7 @@ def _tuned(layer: nn.Conv2d, tuning: Tuning) -> HiddenLayer:
 def _filled(layer: nn.Conv2d, multiple: int, least: int) -> nn.Conv2d:
     inputs, outputs = (max(-(-count // multiple) * multiple, least) for count in (layer.in_channels, layer.out_channels))
     kernel = layer.kernel_size
-    filled = nn.utils.skip_init(nn.Conv2d, inputs, outputs, (kernel[0], kernel[1]))
+    filled = UnsetConvolution(inputs, outputs, (kernel[0], kernel[1]))
     assert filled.bias is not None and layer.bias is not None
     with torch.no_grad():
         filled.weight.zero_()[: layer.out_channels, : layer.in_channels] = layer.weight

@@ -32,6 +32,7 @@ from lfcore.tuned_stack import TunedStack, Tuning
 
 _BUDGET_SECONDS = 1.5  # after it nothing new is timed; what has not been, is not chosen
 _SURE_ROUNDS = 4
+_ROUNDS_BEHIND, _FAR_BEHIND = 2, 3.0  # so many are enough for a choice that took so many times what the fastest takes
 _SMALL_WIDTH = 144
 _FOURIER_ROWS = 32  # with which, at _SMALL_WIDTH, few pixels of the transforms' own tiles are lost
 _ROUNDS = 10  # in turn, and the best of each, so that a busy moment of the machine does not decide
@@ -119,23 +120,34 @@ def _clearly_least(choices: list[Tuning], cost: Mapping[Tuning, float], factor: 
 
 def _fastest(choices: Sequence[Tuning], needed: int, deadline: float) -> tuple[dict[Tuning, float], bool]:
     """Seconds a pixel of the disparity network's hidden layers, by choice, infinite where it had too few turns; and whether
-    none had. The first `needed` always have enough."""
+    none had. The first `needed` always have enough; those that are far behind need no more, and those that differ from
+    such a one by filled channels none, for filling hardly gains more than that."""
     seconds = dict.fromkeys(choices, math.inf)
     probes: dict[Tuning, Callable[[], float]] = {}
     turns = dict.fromkeys(choices, 0)
+
+    def far_behind(choice: Tuning) -> bool:
+        least = min(seconds.values())
+        alike = [each for each in (choice, replace(choice, channel_multiple=1)) if each in turns]
+        return any(turns[each] >= _ROUNDS_BEHIND and seconds[each] > _FAR_BEHIND * least for each in alike)
+
+    def decided(choice: Tuning) -> bool:
+        return turns[choice] >= _SURE_ROUNDS or far_behind(choice)
+
     with torch.inference_mode():
         for turn in range(_ROUNDS):
             for index, choice in enumerate(choices):
-                if time.perf_counter() > deadline and (index >= needed or turn >= _SURE_ROUNDS):
+                late, first = time.perf_counter() > deadline, index < needed
+                if far_behind(choice) or (late and (decided(choice) or not first)):
+                    continue
+                if needed and not first and turn < _ROUNDS_BEHIND:  # the first ones may decide it
                     continue
                 if choice not in probes:
                     probes[choice] = _probe(choice)
                 seconds[choice] = min(seconds[choice], probes[choice]())
                 turns[choice] += 1
-    for choice in choices:
-        if turns[choice] < _SURE_ROUNDS:
-            seconds[choice] = math.inf
-    return seconds, min(turns.values()) >= _SURE_ROUNDS
+    surely = {choice: decided(choice) for choice in choices}
+    return {choice: value if surely[choice] else math.inf for choice, value in seconds.items()}, all(surely.values())
 
 
 def _probe(tuning: Tuning) -> Callable[[], float]:

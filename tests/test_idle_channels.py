@@ -1,6 +1,8 @@
 """Channels that count for nothing are found, set to 0 while training, and left out of what is computed."""
 
 import copy
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -99,3 +101,20 @@ def test_the_shipped_networks_have_as_many_idle_channels_as_their_file_says() ->
     assert isinstance(weights.model, FullModel)
     used = [widths(used_layers(stack)) for stack in (weights.model.disparity, weights.model.colour)]
     assert 500 - sum(map(sum, used)) == weights.training["idle_channels"] > 100
+
+
+def test_no_model_loads_a_library_that_it_does_not_need() -> None:
+    """Half a second of each start was one for symbolic mathematics, which torch loads for some ways of making a layer."""
+    code = """
+import sys
+import numpy as np
+from lfcore.lightfield import LightField
+from lfcore.synthesizer import make_synthesizer
+for model in ("realtime", "full", "single"):
+    synthesizer = make_synthesizer(model)
+    synthesizer.set_light_field(LightField(np.zeros((2, 2, 40, 48, 3), np.uint8), "made up", "", ""))
+    synthesizer.synthesize(0.5, 0.5)
+assert "torch" in sys.modules
+sys.exit("sympy" in sys.modules)
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=120).returncode == 0

@@ -123,6 +123,25 @@ def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytes
     ]
 
 
+def test_what_is_far_behind_is_given_up_after_two_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    timed: list[Tuning] = []
+
+    def probe(choice: Tuning) -> Callable[[], float]:
+        def seconds() -> float:
+            timed.append(choice)
+            return (0.1 if choice.fourier else 1.0) * (0.5 if choice.dtype == torch.bfloat16 else 1.0)
+
+        return seconds
+
+    monkeypatch.setattr(tuning, "_probe", probe)
+    monkeypatch.setattr(tuning, "best_way", lambda dtype: Way.TORCH)
+    assert tuning.measured(transforms=True) == (Tuning.by_fourier(torch.bfloat16), True)
+    turns = {choice: timed.count(choice) for choice in timed}
+    directly = {choice: count for choice, count in turns.items() if not choice.fourier}
+    assert directly == {Tuning(dtype, 144): 2 for dtype in (torch.float32, torch.bfloat16)}  # with filled channels none
+    assert min(count for choice, count in turns.items() if choice.fourier) >= 4
+
+
 def test_a_choice_made_in_a_hurry_is_not_remembered(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     monkeypatch.setattr(tuning, "measured", lambda: (CHOICE, False))
     assert tuning.machine_tuning() == CHOICE
