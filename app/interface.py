@@ -389,7 +389,7 @@ class Interface:
         self._canvas.draw_exhibit(target, _scaled(area, pixels), _magnified(placement, pixels), colours)
 
     def _paint(self, target: Target, layout: Layout, pixels: float) -> bool:
-        """Paint the whole window in the processor's memory and copy it there, where all that is in it can be painted; whether
+        """Paint the whole window in the processor's memory and have it shown, where all that is in it can be painted; whether
         that was so."""
         if self._light_field is None or self._saving or layout.strips is not None:
             return False
