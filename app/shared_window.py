@@ -97,6 +97,8 @@ class SharedWindow:
 
     def show(self, sheet: ByteArray, boxes: Sequence[Box]) -> None:
         """These boxes of the sheet that was asked for last into the window, until the server has taken them."""
+        if not boxes:
+            return  # without asking the server for anything
         for box in boxes:
             size = box.right - box.left, box.bottom - box.top
             places = box.left, box.top, box.left, box.top, *size

@@ -44,13 +44,13 @@ def stacks_and_inputs(model: Model, show: Callable[[], None]) -> list[tuple[Pape
     stacks = [module for module in model.modules() if isinstance(module, PaperStack)]
     if not stacks:
         return []
-    with inputs_of(stacks) as seen:
+    with _inputs_of(stacks) as seen:
         show()
     return list(zip(stacks, seen, strict=True))
 
 
 @contextmanager
-def inputs_of(stacks: Sequence[PaperStack]) -> Iterator[list[list[Tensor]]]:
+def _inputs_of(stacks: Sequence[PaperStack]) -> Iterator[list[list[Tensor]]]:
     """What each stack is given while the block runs, float32."""
     seen: list[list[Tensor]] = [[] for _ in stacks]
     hooks = [
