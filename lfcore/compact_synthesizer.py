@@ -17,7 +17,7 @@ from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Window, deviation_sweep, luminance
 from lfcore.synthesis import LateSynthesis
-from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
+from lfcore.synthesizer import Clock, Synthesis, check_cancelled, continued, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
 from lfcore.tuned_stack import Tuning
 from lfcore.tuning import machine_tuning
@@ -35,13 +35,6 @@ def half_luma(images: Tensor) -> Tensor:
     """(..., 3, H, W) stored values -> (..., H / 2, W / 2) luminance in the root tone, from which the sweep is made."""
     luma = root_tone(luminance(images))
     return F.avg_pool2d(luma.flatten(0, -3), 2).view(*luma.shape[:-2], luma.shape[-2] // 2, luma.shape[-1] // 2)
-
-
-def continued(corners: Tensor) -> Tensor:
-    """Corner views (4, 3, H, W) continued beyond their edges by REACH, and to whole blocks of ALIGNMENT px."""
-    height, width = corners.shape[2:]
-    filled = [-size % ALIGNMENT for size in (height, width)]
-    return F.pad(corners, (REACH, REACH + filled[1], REACH, REACH + filled[0]), mode="replicate")
 
 
 class CompactSynthesizer:
@@ -63,7 +56,7 @@ class CompactSynthesizer:
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
-        padded = continued(corner_tensor(light_field))
+        padded = continued(corner_tensor(light_field), REACH, ALIGNMENT)
         self._size = light_field.height, light_field.width
         self._corners = self._networks.prepared(root_tone(padded))
         self._luma = half_luma(padded).unsqueeze(1)

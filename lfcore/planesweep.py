@@ -64,6 +64,10 @@ class Window:
         """(height, width)."""
         return self.bottom - self.top, self.right - self.left
 
+    def moved(self, by: int) -> Window:
+        """As large, so many px farther down and to the right."""
+        return Window(self.top + by, self.bottom + by, self.left + by, self.right + by)
+
 
 # A block of the sweep (rows x columns x levels of one input) should stay in the cache of a core or two.
 _BLOCK_VALUES = 2**19

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
-from lfcore.networks import SingleModel, single_features
-from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_tensor, never, picture, put
+from lfcore.networks import BORDER, SingleModel, single_features
+from lfcore.synthesizer import Clock, Synthesis, check_cancelled, continued, corner_tensor, never, picture, put
 from lfcore.tuned_stack import TunedStack, Tuning
 from lfcore.tuning import machine_tuning
 
@@ -25,7 +25,7 @@ class SingleSynthesizer:
         self.config = model.config
         self._tuning = tuning or machine_tuning()
         self._stack = TunedStack(model.colour, self._tuning)
-        self._inputs: Tensor | None = None  # (1, 12, H, W)
+        self._inputs: Tensor | None = None  # (1, 12, H + 2 BORDER, W + 2 BORDER), continued beyond their edges
 
     @property
     def dtype(self) -> torch.dtype:
@@ -33,17 +33,17 @@ class SingleSynthesizer:
         return self._tuning.dtype
 
     def set_light_field(self, light_field: LightField) -> None:
-        self._inputs = corner_tensor(light_field).flatten(0, 1).unsqueeze(0)
+        self._inputs = continued(corner_tensor(light_field), BORDER).flatten(0, 1).unsqueeze(0)
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._inputs is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        height, width = self._inputs.shape[2:]
+        height, width = (size - 2 * BORDER for size in self._inputs.shape[2:])
         clock, check = Clock(), partial(check_cancelled, cancelled)
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
-            features = single_features(self._inputs, torch.tensor([[u, v]]))  # (1, 14, H, W)
+            features = single_features(self._inputs, torch.tensor([[u, v]]))
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._stack(self._stack.tile_input(features, tile), check))
             clock.lap("colour")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 from lfcore.errors import Cancelled, InputError
@@ -26,6 +27,12 @@ from lfcore.warp import backward_warp, source_offset
 def corner_tensor(light_field: LightField) -> Tensor:
     """The corner views as (4, 3, H, W) float32: the one crossing from numpy to torch."""
     return torch.from_numpy(light_field.corners()).permute(0, 3, 1, 2).contiguous()
+
+
+def continued(pictures: Tensor, by: int, alignment: int = 1) -> Tensor:
+    """(N, C, H, W) with their edges repeated for so many px beyond them, and below and on the right to whole blocks."""
+    height, width = pictures.shape[2:]
+    return F.pad(pictures, (by, by + -width % alignment, by, by + -height % alignment), mode="replicate")
 
 
 def corner_offsets(u: float, v: float) -> Tensor:

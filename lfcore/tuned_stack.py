@@ -28,7 +28,7 @@ class Tuning:
     """How the paper's networks are computed; the type also serves the other networks."""
 
     dtype: torch.dtype = torch.float32
-    tile_width: int = 272  # px that come out; the height follows from tile_pixels
+    tile_width: int = 288  # px that come out; the height follows from tile_pixels
     channel_multiple: int = 1  # channels of hidden layers are filled up with zeros to a multiple of this
     tile_pixels: int = TILE_PIXELS
     way: Way = Way.TORCH  # in which convolutions are computed, those of the small pair too
@@ -40,53 +40,26 @@ class Tuning:
     @classmethod
     def by_fourier(cls, dtype: torch.dtype, way: Way = Way.TORCH) -> Tuning:
         """With Fourier transforms, few means, and larger tiles, since the transforms' own have overlaps already."""
-        return cls(dtype, 2 * 272, 1, 2 * TILE_PIXELS, way, fourier=True, means=_FEW_MEANS)
+        return cls(dtype, 2 * 288, 1, 2 * TILE_PIXELS, way, fourier=True, means=_FEW_MEANS)
 
     def tiles(self, height: int, width: int) -> Iterator[Tile]:
-        """Cover a picture with tiles of about equal size, from the top left."""
+        """Cover what comes out with tiles of about equal size, from the top left."""
         for top, bottom in _spans(height, max(self.tile_pixels // self.tile_width, _STEP)):
             for left, right in _spans(width, self.tile_width):
-                yield Tile(Window(top, bottom, left, right), height, width)
+                yield Tile(Window(top, bottom, left, right))
 
 
+@dataclass(frozen=True)
 class Tile:
-    """A part of the picture, and what a PaperStack must see for it: BORDER more on each side.
+    """A part of what a PaperStack puts out, and of its input, which is BORDER larger on each side."""
 
-    Where the picture ends, that border is its mirror image.
-    """
-
-    def __init__(self, window: Window, height: int, width: int) -> None:
-        self.window = window
-        self.source = Window(
-            max(window.top - BORDER, 0),
-            min(window.bottom + BORDER, height),
-            max(window.left - BORDER, 0),
-            min(window.right + BORDER, width),
-        )
+    window: Window  # of what comes out
 
     @property
-    def shape(self) -> tuple[int, int]:
-        """(height, width) of the input, with its whole border."""
-        height, width = self.window.shape
-        return height + 2 * BORDER, width + 2 * BORDER
-
-    def inner(self, x: Tensor) -> Tensor:
-        """The part of an input (1, C, *shape) that `source` fills."""
-        top, left = self.source.top - self.window.top + BORDER, self.source.left - self.window.left + BORDER
-        height, width = self.source.shape
-        return x[:, :, top : top + height, left : left + width]
-
-    def mirror(self, x: Tensor) -> None:
-        """Set what lies beyond the picture in an input whose inner part is set."""
-        window, source = self.window, self.source
-        _mirror_edges(x, 2, source.top - window.top + BORDER, window.bottom + BORDER - source.bottom)
-        _mirror_edges(x, 3, source.left - window.left + BORDER, window.right + BORDER - source.right)
-
-
-def _mirror_edges(x: Tensor, dim: int, before: int, after: int) -> None:
-    size = x.shape[dim]
-    x.narrow(dim, 0, before).copy_(x.narrow(dim, before + 1, before).flip(dim))
-    x.narrow(dim, size - after, after).copy_(x.narrow(dim, size - 2 * after - 1, after).flip(dim))
+    def source(self) -> Window:
+        """What the stack must see for it, of the input."""
+        window = self.window
+        return Window(window.top, window.bottom + 2 * BORDER, window.left, window.right + 2 * BORDER)
 
 
 def _spans(size: int, most: int) -> list[tuple[int, int]]:
@@ -123,11 +96,10 @@ class TunedStack:
         return x
 
     def tile_input(self, features: Tensor, tile: Tile) -> Tensor:
-        """What the stack must see for a tile, of the features (1, channels, H, W) of the whole picture."""
+        """What the stack must see for a tile, of its whole input (1, channels, H, W)."""
         source = tile.source
-        x = self.empty_input(*tile.shape)
-        tile.inner(x)[:, : self._channels] = features[:, :, source.top : source.bottom, source.left : source.right]
-        tile.mirror(x)
+        x = self.empty_input(*source.shape)
+        x[:, : self._channels] = features[:, :, source.top : source.bottom, source.left : source.right]
         return x
 
     def __call__(self, x: Tensor, check: Callable[[], None] = unchecked) -> Tensor:

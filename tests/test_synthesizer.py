@@ -1,16 +1,19 @@
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 import torch
 from scenes import plane
+from whole_reference import whole_reference
 
 from lfcore.errors import Cancelled, InputError, WeightsError
 from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel, ModelConfig, initialise
 from lfcore.planesweep import Levels
-from lfcore.synthesizer import MeanSynthesizer, corner_tensor, make_synthesizer, reference_synthesis
+from lfcore.synthesizer import MeanSynthesizer, corner_offsets, corner_tensor, make_synthesizer, reference_synthesis
 from lfcore.tuned_stack import Tuning
+from lfcore.warp import backward_warp
 
 SIZE = (70, 83)
 
@@ -32,19 +35,37 @@ def tuning(dtype: torch.dtype, tile: tuple[int, int]) -> Tuning:
     return Tuning(dtype, tile[1], 1, tile[0] * tile[1])
 
 
-def test_the_inside_equals_the_reference_without_padding() -> None:
+@pytest.mark.parametrize("q", [(0.3, 0.6), (-0.25, 1.25)])
+def test_every_pixel_equals_the_reference_of_continued_inputs(q: tuple[float, float]) -> None:
+    model, field = small_model(), plane(3.0, size=SIZE)
+    reference = whole_reference(model, field, *q)
+    synthesizer = float32(model, (1000, 1000))
+    synthesizer.set_light_field(field)
+    found = synthesizer.synthesize(*q)
+    assert found.image.shape == (*SIZE, 3) and found.disparity is not None and found.warped is not None
+    assert float(reference.disparity.std()) > 0.05  # the map is not flat, so the warp is tested
+    np.testing.assert_allclose(found.disparity, reference.disparity, atol=1e-4)
+    np.testing.assert_allclose(found.image, reference.image, atol=1e-4)
+    warped = backward_warp(corner_tensor(field), torch.tensor(reference.disparity)[None, None], corner_offsets(*q))
+    np.testing.assert_allclose(found.warped, warped.permute(0, 2, 3, 1), atol=1e-4)
+
+
+def test_far_from_the_edges_that_is_the_reference_of_the_inputs_themselves() -> None:
     model, field = small_model(), plane(3.0, size=SIZE)
     image, disparity, warped = reference_synthesis(model, corner_tensor(field), 0.3, 0.6)
     synthesizer = float32(model, (1000, 1000))
     synthesizer.set_light_field(field)
     found = synthesizer.synthesize(0.3, 0.6)
-    assert found.image.shape == (*SIZE, 3) and found.disparity is not None and found.warped is not None
-    assert float(disparity.std()) > 0.05  # the map is not flat, so the warp is tested
-    b = slice(BORDER, -BORDER)
-    np.testing.assert_allclose(found.disparity[b, b], disparity, atol=1e-4)
-    np.testing.assert_allclose(found.warped[:, b, b], warped.permute(0, 2, 3, 1), atol=1e-4)
-    bb = slice(2 * BORDER, -2 * BORDER)
-    np.testing.assert_allclose(found.image[bb, bb], image.permute(1, 2, 0).clamp(0, 1), atol=1e-4)
+    assert found.disparity is not None and found.warped is not None
+    far = 9 * 0.7 + 2  # px that samples of the sweep lie beside their pixels at most, with their taps
+    inner = math.ceil(far)
+    beside = slice(BORDER + inner, -BORDER - inner)
+    np.testing.assert_allclose(found.disparity[beside, beside], disparity[inner:-inner, inner:-inner], atol=1e-4)
+    own = warped[..., inner:-inner, inner:-inner].permute(0, 2, 3, 1)
+    np.testing.assert_allclose(found.warped[:, beside, beside], own, atol=1e-4)
+    beside = slice(2 * BORDER + inner, -2 * BORDER - inner)
+    own = image[:, inner:-inner, inner:-inner].permute(1, 2, 0).clamp(0, 1)
+    np.testing.assert_allclose(found.image[beside, beside], own, atol=1e-4)
 
 
 def test_no_dark_fringe_where_the_warp_leaves_the_picture() -> None:

@@ -15,6 +15,7 @@ from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import CORNERS, LightField
 from lfcore.models import TRAINABLE
+from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel, initialise
 from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
@@ -319,6 +320,28 @@ def test_a_teacher_adds_the_distance_to_its_disparity(tmp_path: Path) -> None:
     assert disparity is not None
     distance = torch.nn.functional.smooth_l1_loss(disparity[:, 0], torch.from_numpy(np.stack(wanted)))
     assert float(taught - alone) == pytest.approx(0.7 * float(distance), rel=0.15)  # what lies beyond the patch differs
+
+
+def test_at_an_edge_of_the_picture_the_papers_pair_is_trained_on_what_it_is_used_for() -> None:
+    """The group's inputs as a light field of their own: there the synthesizer finds the same picture as the training."""
+    pair, model = architecture("full"), FullModel()
+    initialise(model, 3)
+    with torch.no_grad():
+        model.disparity.last.weight *= 20  # some pixels of disparity, so that samples lie beyond the edge
+    at_edge = replace(SMALL, batch=1, group=1, edge_share=1.0)
+    group = replace(sample_group([scene(3.0)], at_edge, LEVELS, np.random.default_rng(8)), shift=0.0)
+    w, (height, width) = group.window, group.inputs.shape[-2:]
+    assert min(w.top, w.left, height - w.bottom, width - w.right) == 0
+    with torch.no_grad():
+        found = pair.predict(model, Batch.of([group], torch.device("cpu")), lambda: torch.autocast("cpu", enabled=False))
+    views = np.zeros((2, 2, height, width, 3), np.float32)
+    for k, (u, v) in enumerate(CORNERS):
+        views[int(v), int(u)] = group.inputs[k, 0].transpose(1, 2, 0)
+    synthesizer = NetworkSynthesizer(model, "same", Tuning())
+    synthesizer.set_light_field(LightField(views, "patch", "", ""))
+    expected = synthesizer.synthesize(group.u, group.v)
+    inner = slice(w.top + found.border, w.bottom - found.border), slice(w.left + found.border, w.right - found.border)
+    np.testing.assert_allclose(found.image[0].clamp(0, 1).permute(1, 2, 0), expected.image[inner], atol=1e-4)
 
 
 def test_only_the_small_pair_can_teach(tmp_path: Path) -> None:

@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-import torch.nn.functional as F
 
 from lfcore.layers import Way
 from lfcore.networks import BORDER, PaperStack
+from lfcore.planesweep import Window
 from lfcore.tuned_stack import TunedStack, Tuning
 
 
@@ -16,19 +16,20 @@ from lfcore.tuned_stack import TunedStack, Tuning
 def test_tiles_cover_the_picture_once_and_are_no_larger_than_asked(size: tuple[int, int], tile: tuple[int, int]) -> None:
     seen = np.zeros(size, int)
     for part in Tuning(tile_width=tile[1], tile_pixels=tile[0] * tile[1]).tiles(*size):
-        window, source = part.window, part.source
+        window = part.window
         seen[window.top : window.bottom, window.left : window.right] += 1
         assert 0 < window.shape[0] <= tile[0] and 0 < window.shape[1] <= tile[1]
-        assert source.top == max(window.top - BORDER, 0) and source.bottom == min(window.bottom + BORDER, size[0])
-        assert source.left == max(window.left - BORDER, 0) and source.right == min(window.right + BORDER, size[1])
+        rows, columns = window.shape
+        bottom, right = window.top + rows + 2 * BORDER, window.left + columns + 2 * BORDER
+        assert part.source == Window(window.top, bottom, window.left, right)
     assert (seen == 1).all()
 
 
 @pytest.mark.parametrize("multiple", [1, 16, 32])
-def test_tiles_of_a_filled_stack_are_parts_of_the_stack_on_the_mirrored_picture(multiple: int) -> None:
+def test_tiles_of_a_filled_stack_are_parts_of_the_stack_on_the_whole_input(multiple: int) -> None:
     torch.manual_seed(1)
-    stack, features = PaperStack(5, 2), torch.randn(1, 5, 50, 61)
-    expected = stack(F.pad(features, (BORDER,) * 4, mode="reflect"))
+    stack, features = PaperStack(5, 2), torch.randn(1, 5, 50 + 2 * BORDER, 61 + 2 * BORDER)
+    expected = stack(features)
     tuning = Tuning(torch.float32, 32, multiple, 32 * 20)
     tuned = TunedStack(stack, tuning)
     with torch.inference_mode():
@@ -45,8 +46,8 @@ def test_tiles_of_a_filled_stack_are_parts_of_the_stack_on_the_mirrored_picture(
 @pytest.mark.parametrize("channels", [5, 24])
 def test_the_same_by_transforms(channels: int, way: Way) -> None:
     torch.manual_seed(2)
-    stack, features = PaperStack(channels, 3), torch.randn(1, channels, 50, 61)
-    expected = stack(F.pad(features, (BORDER,) * 4, mode="reflect"))
+    stack, features = PaperStack(channels, 3), torch.randn(1, channels, 50 + 2 * BORDER, 61 + 2 * BORDER)
+    expected = stack(features)
     tuning = dataclasses.replace(Tuning.by_fourier(torch.float32, way), tile_width=32, tile_pixels=32 * 20)
     tuned = TunedStack(stack, tuning)
     with torch.inference_mode():

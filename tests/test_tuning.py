@@ -93,11 +93,11 @@ def test_what_is_unusual_is_chosen_for_a_clear_gain_only(monkeypatch: pytest.Mon
         assert sure
         return chosen
 
-    assert choose(0.9, 0.95, 0.97) == Tuning(torch.float32, 272, 1)
-    assert choose(0.5, 0.95, 0.97) == Tuning(torch.bfloat16, 272, 1)
-    assert choose(0.5, 0.7, 0.97) == Tuning(torch.bfloat16, 272, 16)
+    assert choose(0.9, 0.95, 0.97) == Tuning(torch.float32, 288, 1)
+    assert choose(0.5, 0.95, 0.97) == Tuning(torch.bfloat16, 288, 1)
+    assert choose(0.5, 0.7, 0.97) == Tuning(torch.bfloat16, 288, 16)
     assert choose(0.9, 0.7, 0.6) == Tuning(torch.float32, 144, 16)
-    assert choose(0.9, 1.0, 0.97, 0.95) == Tuning(torch.float32, 272, 1)
+    assert choose(0.9, 1.0, 0.97, 0.95) == Tuning(torch.float32, 288, 1)
     assert choose(0.9, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.float32)
     assert choose(0.5, 0.7, 0.6, 0.5) == Tuning.by_fourier(torch.bfloat16)
     assert choose(0.5, 0.7, 0.6, 0.5, torch.bfloat16) == Tuning.by_fourier(torch.bfloat16, Way.WINOGRAD)
@@ -114,7 +114,7 @@ def test_where_time_is_short_only_the_plain_choices_are_timed(monkeypatch: pytes
 
     monkeypatch.setattr(tuning, "_probe", probe)
     monkeypatch.setattr(tuning, "_BUDGET_SECONDS", 0.0)
-    assert tuning.measured(transforms=False) == (Tuning(torch.bfloat16, 272, 1), False)
+    assert tuning.measured(transforms=False) == (Tuning(torch.bfloat16, 288, 1), False)
     assert timed == [Tuning(torch.float32, 144, 1), Tuning(torch.bfloat16, 144, 1)]
     timed.clear()
     tuning.measured(transforms=True)

@@ -110,11 +110,12 @@ class PaperPair:
     def predict(self, model: Model, batch: Batch, autocast: Autocast) -> Prediction:
         """See Architecture."""
         assert isinstance(model, FullModel)
-        lumas = [sweep_luminance(images, model.config) for images in batch.inputs]
+        places = _places(batch)
+        lumas = [sweep_luminance(place.images, model.config) for place in places]
         features = torch.cat(
             [
-                plane_sweep(luma, offsets, model.config.levels.moved(-group.shift), group.window)
-                for luma, offsets, group in zip(lumas, batch.offsets, batch.groups, strict=True)
+                plane_sweep(luma, offsets, model.config.levels.moved(-group.shift), place.window)
+                for luma, offsets, group, place in zip(lumas, batch.offsets, batch.groups, places, strict=True)
             ]
         )  # (sum of B, 2 L, P, P)
         with autocast():
@@ -122,8 +123,8 @@ class PaperPair:
         pieces = disparity.split(batch.sizes)
         warped = torch.cat(
             [
-                warp_inputs(images, piece - group.shift, offsets, (group.window.top + BORDER, group.window.left + BORDER))
-                for images, piece, offsets, group in zip(batch.inputs, pieces, batch.offsets, batch.groups, strict=True)
+                warp_inputs(place.images, piece - group.shift, offsets, (place.window.top + BORDER, place.window.left + BORDER))
+                for place, piece, offsets, group in zip(places, pieces, batch.offsets, batch.groups, strict=True)
             ]
         )
         h = colour_features(disparity, warped, batch.positions)
