@@ -7,6 +7,7 @@ its speed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
@@ -23,18 +24,23 @@ class UsedLayers:
     last: nn.Conv2d
 
 
+def used_channels(stack: PaperStack) -> list[Tensor]:
+    """What the first layer takes, what of each layer the next one uses, and what the last one gives: indices, ascending.
+
+    Of a layer that is not used at all one channel is left.
+    """
+    layers, channels = [*stack.convolutions, stack.last], [torch.arange(stack.last.out_channels)]
+    for layer in reversed(layers[1:]):
+        used = layer.weight[channels[0]].detach().abs().amax((0, 2, 3)).nonzero().flatten()
+        channels.insert(0, used if len(used) else torch.zeros(1, dtype=torch.long))
+    return [torch.arange(layers[0].in_channels), *channels]
+
+
 def used_layers(stack: PaperStack) -> UsedLayers:
-    """Copies of the layers, each hidden channel of which the next one uses; of a layer that is not used at all one is left."""
-    following, kept_layers = stack.last, []
-    outputs = torch.arange(following.out_channels)
-    for layer in reversed(stack.convolutions):
-        used = following.weight[outputs].detach().abs().amax((0, 2, 3)).nonzero().flatten()
-        used = used if len(used) else torch.zeros(1, dtype=torch.long)
-        kept_layers.append(_part(following, outputs, used))
-        following, outputs = layer, used
-    kept_layers.append(_part(following, outputs, torch.arange(following.in_channels)))
-    last, *hidden = kept_layers
-    return UsedLayers(hidden[::-1], last)
+    """Copies of the layers with their used channels alone."""
+    layers = zip([*stack.convolutions, stack.last], pairwise(used_channels(stack)), strict=True)
+    *hidden, last = [_part(layer, given, taken) for layer, (taken, given) in layers]
+    return UsedLayers(hidden, last)
 
 
 def _part(layer: nn.Conv2d, outputs: Tensor, inputs: Tensor) -> nn.Conv2d:

@@ -86,7 +86,8 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         type=int,
         metavar="N",
         default=500,
-        help="steps after which dead channels get new weights, while the rate is high; 0: never (500)",
+        help="steps after which dead channels get new weights, while the rate is high; 0: never, and idle ones of --init are "
+        "left out (500)",
     )
     parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
     parser.add_argument(

@@ -39,6 +39,7 @@ from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, chec
 from lfcore.training.plot import plot
 from lfcore.training.revival import Part, Surroundings, revive
 from lfcore.training.team import ALONE, Team
+from lfcore.training.trimming import trim
 from lfcore.tuning import machine_tuning
 from lfcore.weights import Weights, save_weights
 
@@ -202,6 +203,8 @@ class Trainer:
         self._model = self._architecture.start(config.seed)
         if initial is not None:
             self._model.load_state_dict(initial.state_dict())
+        # What is idle in given weights stays so, if nothing revives it.
+        self._trimmed = trim(self._model) if initial is not None and config.revival_steps <= 0 else None
         self._architecture.prepare(self._model)
         self._model.to(device=device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._average = copy.deepcopy(self._model)
@@ -246,9 +249,14 @@ class Trainer:
         show = partial(self._show, self._model, scenes, self.step, self._device)
         return revive(self._model, Surroundings(show, forget, self._team.agree, generator))
 
+    def _plain(self) -> Model:
+        """The averaged weights as they are used."""
+        whole = self._trimmed.whole(copy.deepcopy(self._average)) if self._trimmed else self._average
+        return self._architecture.plain(whole)
+
     def _plain_and_cleared(self, scenes: Sequence[TrainingScene]) -> tuple[Model, int]:
         """The averaged weights as they are used, and how many of their channels are idle and were set to 0."""
-        plain = self._architecture.plain(self._average)
+        plain = self._plain()
         return plain, clear(plain, partial(self._show, plain, scenes, 0, torch.device("cpu")))
 
     def _show(self, model: Model, scenes: Sequence[TrainingScene], step: int, device: torch.device) -> None:
@@ -283,7 +291,7 @@ class Trainer:
 
     def validate(self, light_fields: Sequence[LightField], loss: float) -> CurvePoint:
         """K16 of the averaged weights on each held-out light field, by the synthesizer that users get."""
-        synthesizer = synthesizer_of(self._architecture.plain(self._average), "validation")
+        synthesizer = synthesizer_of(self._plain(), "validation")
         scores: dict[str, float] = {}
         for light_field in light_fields:
             row, column = k16_view(light_field)

@@ -88,7 +88,7 @@ def _renew(
     around: Surroundings,
 ) -> None:
     """New weights for the channels of `layer` that are `dead` (out,); `following` takes them with weights of 0."""
-    weight, onward, bias = _trained(layer), _trained(following), layer.bias
+    weight, onward, bias = trained_weight(layer), trained_weight(following), layer.bias
     assert isinstance(bias, nn.Parameter)
     size = torch.stack([F.relu(part[:, ~dead]).square().mean((0, 2, 3)) for part in sums]).mean(0).sqrt().median()
     drawn = torch.randn(weight[dead].shape, generator=around.generator).to(weight)
@@ -103,7 +103,7 @@ def _renew(
         around.forget(parameter, part)
 
 
-def _trained(layer: nn.Conv2d) -> nn.Parameter:
+def trained_weight(layer: nn.Conv2d) -> nn.Parameter:
     """The parameter from which a layer's weights come."""
     if parametrize.is_parametrized(layer, "weight"):
         parametrizations = cast(nn.ModuleDict, layer.parametrizations)
