@@ -39,8 +39,8 @@ class NetworkSynthesizer:
     """See lfcore.synthesizer.Synthesizer. The whole picture comes out: it is the inner part of `reference_synthesis` of corner
     views whose edges are repeated beyond them.
 
-    Memory while it works: about 700 bytes a pixel of the picture, and for the tile in work 110 MB, by Fourier transforms 160
-    to 180 MB with their weights; in float32 twice that.
+    Memory while it works: about 400 bytes a pixel of the picture, and what the tile in work takes. In bfloat16, by Fourier
+    transforms, a process that does nothing else came to 422 MiB with views of 541 x 376 px, to 986 with nine times as many.
     """
 
     def __init__(self, model: FullModel, key: str, tuning: Tuning | None = None) -> None:

@@ -43,7 +43,7 @@ class SingleSynthesizer:
         clock, check = Clock(), partial(check_cancelled, cancelled)
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
-            features = single_features(self._inputs, torch.tensor([[u, v]]))
+            features = single_features(self._inputs, torch.tensor([[u, v]]))  # (1, 14, the same)
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._stack(self._stack.tile_input(features, tile), check))
             clock.lap("colour")

@@ -32,9 +32,9 @@ class Trimmed:
             for layer, of_full, (taken, given) in zip(_layers(stack), _layers(full), pairwise(channels), strict=True):
                 weight, bias = trained_weight(layer), layer.bias
                 assert isinstance(bias, nn.Parameter)
-                filled = weight.new_zeros(of_full.weight.shape)
-                filled[given[:, None], taken] = weight
-                weight.data, bias.data = filled, bias.new_zeros(of_full.out_channels).index_copy_(0, given, bias)
+                whole_weight, whole_bias = weight.new_zeros(of_full.weight.shape), bias.new_zeros(of_full.out_channels)
+                whole_weight[given[:, None], taken], whole_bias[given] = weight, bias
+                weight.data, bias.data = whole_weight, whole_bias
         return model
 
 
