@@ -39,9 +39,14 @@ def revive(model: Model, around: Surroundings) -> int:
     return sum(_revive_stack(stack, inputs, around) for stack, inputs in stacks_and_inputs(model, around.show))
 
 
+def paper_stacks(model: Model) -> list[PaperStack]:
+    """Those of a model, in the order of its modules."""
+    return [module for module in model.modules() if isinstance(module, PaperStack)]
+
+
 def stacks_and_inputs(model: Model, show: Callable[[], None]) -> list[tuple[PaperStack, list[Tensor]]]:
     """Each PaperStack of a model, and what it is given while `show` runs, float32; a model without any is not shown."""
-    stacks = [module for module in model.modules() if isinstance(module, PaperStack)]
+    stacks = paper_stacks(model)
     if not stacks:
         return []
     with _inputs_of(stacks) as seen:

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from lfcore.idle_channels import used_channels
 from lfcore.models import Model
 from lfcore.networks import PaperStack
-from lfcore.training.revival import trained_weight
+from lfcore.training.revival import paper_stacks, trained_weight
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Trimmed:
     @torch.no_grad()
     def whole(self, model: Model) -> Model:
         """A trimmed model, in place, with what has been left out as zeros."""
-        for stack, channels in zip(_stacks(model), self.channels, strict=True):
+        for stack, channels in zip(paper_stacks(model), self.channels, strict=True):
             full = PaperStack(len(channels[0]), len(channels[-1]))
             for layer, of_full, (taken, given) in zip(_layers(stack), _layers(full), pairwise(channels), strict=True):
                 weight, bias = trained_weight(layer), layer.bias
@@ -41,17 +41,13 @@ class Trimmed:
 @torch.no_grad()
 def trim(model: Model) -> Trimmed:
     """Leave the idle channels out of every PaperStack of a model, in place; one without any stays as it is."""
-    trimmed = Trimmed(tuple(tuple(used_channels(stack)) for stack in _stacks(model)))
-    for stack, channels in zip(_stacks(model), trimmed.channels, strict=True):
+    trimmed = Trimmed(tuple(tuple(used_channels(stack)) for stack in paper_stacks(model)))
+    for stack, channels in zip(paper_stacks(model), trimmed.channels, strict=True):
         for layer, (taken, given) in zip(_layers(stack), pairwise(channels), strict=True):
             assert layer.bias is not None
             layer.weight = nn.Parameter(layer.weight[given][:, taken])
             layer.bias = nn.Parameter(layer.bias[given])
     return trimmed
-
-
-def _stacks(model: Model) -> list[PaperStack]:
-    return [module for module in model.modules() if isinstance(module, PaperStack)]
 
 
 def _layers(stack: PaperStack) -> list[nn.Conv2d]:
