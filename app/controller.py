@@ -71,7 +71,7 @@ class Controller:
         self._model = model
         self._models = models or {}
         for name, choice in self._models.items():
-            engine.know(name, choice.make)
+            engine.know(name, choice)
         self._sampler = Sampler()
         self._sway = Sway()
         self.comparing = Comparing(engine, wake)
@@ -363,7 +363,7 @@ class Controller:
         """Another model for a hand at rest. What is on screen stays until its first picture is there."""
         choice = self._models[name]
         self._model = name
-        self._engine.use(name, choice.make, choice.stands_in)
+        self._engine.use(name, choice)
         self.eyes.forget()
         self._asking.forget()
         self._faulted = False
@@ -501,7 +501,7 @@ class Controller:
         if self._engine.failed:
             return Wish(Task.QUICK, here) if self._engine.quick and picture is None else None
         weighed = self.state.look is Look.LEAN and self._engine.weighs
-        unscored = picture is not None and picture.score is None and self.captured_here is not None
+        unscored = self._engine.scored and picture is not None and picture.score is None and self.captured_here is not None
         unweighed = picture is not None and picture.synthesis.weights is None and weighed
         if picture is None or not picture.final or unscored or unweighed:
             moving = not self._resting or (self.newest is None and not self._faulted)
@@ -537,6 +537,7 @@ class Controller:
             measured is not None and measured.difference is self.state.comparison.difference,
             self._scoreboard.table(light_field, self.viewpoint) if self._wants_table else (),
             self._scoreboard.views,
+            self._scoreboard.never_scored,
         )
 
     def _samples(self) -> Samples | None:

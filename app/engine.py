@@ -34,10 +34,12 @@ _ROOM_LEFT = 0.1  # of the memory cache, for what the hand itself asks for
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """A model that the person may choose. stands_in: whether the quick model serves in its place while the hand moves."""
+    """A model that the person may choose. stands_in: whether the quick model serves in its place while the hand moves. scored:
+    whether its pictures are scored against captured views; not where these are its inputs."""
 
     make: MakeSynthesizer
     stands_in: bool
+    scored: bool = True
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,9 @@ class Answer:
 class _Model:
     """A synthesizer that is made when first needed, and takes over a light field when it is another than the last."""
 
-    def __init__(self, make: MakeSynthesizer) -> None:
+    def __init__(self, make: MakeSynthesizer, scored: bool = True) -> None:
         self._make = make
+        self.scored = scored
         self._light_field: LightField | None = None
         self.synthesizer: Synthesizer | None = None
         self.failure: LfviewError | None = None
@@ -96,7 +99,8 @@ class Engine:
     """Answers queries. What computes or reads belongs to one worker thread; the properties, `cached`, `cached_positions` and
     `stored_position` may be used from any.
 
-    `make_synthesizer`: the model for a hand at rest, which `use` finds again by `name`, and in whose place it puts others.
+    `make_synthesizer`: the model for a hand at rest, which `use` finds again by `name`, and in whose place it puts others;
+    `scored`: see ModelChoice.
     `make_quick`: a faster one for a hand that moves; without it the first serves both. `store`: where views of the first are
     kept on disk.
     """
@@ -108,9 +112,10 @@ class Engine:
         make_quick: MakeSynthesizer | None = None,
         store: ViewStore | None = None,
         name: str = "",
+        scored: bool = True,
     ) -> None:
         self.cache = SynthesisCache(cache_bytes)
-        self._final = _Model(make_synthesizer)
+        self._final = _Model(make_synthesizer, scored)
         self._models = {name: self._final}  # by name; those that have been used
         self._stands_in = True  # whether the quick model may serve in place of the other
         self._quick = _Model(make_quick) if make_quick is not None else None
@@ -122,20 +127,19 @@ class Engine:
         self.rule = DEFAULT_RULE  # by which views are scored; the main thread may change it
         self._scores: dict[tuple[CacheKey, str], ScoreText] = {}  # by view and rule
 
-    def use(self, name: str, make_synthesizer: MakeSynthesizer, stands_in: bool) -> None:
+    def use(self, name: str, choice: ModelChoice) -> None:
         """Take another model for a hand at rest; one that was used under this name before is taken up again.
 
-        stands_in: whether the quick model may serve while the hand moves. Belongs to the main thread; a query that runs is
-        answered by the model it began with.
+        Belongs to the main thread; a query that runs is answered by the model it began with.
         """
-        self.know(name, make_synthesizer)
-        self._stands_in = stands_in
+        self.know(name, choice)
+        self._stands_in = choice.stands_in
         self._final = self._models[name]
         self._stored_of, self._stored = None, frozenset()
 
-    def know(self, name: str, make_synthesizer: MakeSynthesizer) -> None:
+    def know(self, name: str, choice: ModelChoice) -> None:
         """Make a model known by its name, if it is not yet; it is loaded when it is first asked for something."""
-        self._models.setdefault(name, _Model(make_synthesizer))
+        self._models.setdefault(name, _Model(choice.make, choice.scored))
 
     @property
     def ready(self) -> bool:
@@ -151,6 +155,11 @@ class Engine:
     def quick(self) -> bool:
         """Whether there is a model for a hand that moves."""
         return self._stands_in and self._quick is not None and self._quick.failure is None
+
+    @property
+    def scored(self) -> bool:
+        """Whether pictures of the model for a hand at rest are scored against captured views."""
+        return self._final.scored
 
     @property
     def weighs(self) -> bool:
@@ -182,6 +191,10 @@ class Engine:
         """The same by a known model."""
         return self._cached(self._models[name], light_field, u, v)
 
+    def scored_by(self, name: str) -> bool:
+        """Whether pictures of a known model are scored against captured views."""
+        return self._models[name].scored
+
     def failed_by(self, name: str) -> bool:
         """Whether a known model could not be loaded."""
         return self._models[name].failure is not None
@@ -206,7 +219,7 @@ class Engine:
         known = self._cached(model, light_field, u, v)
         if weighed and (known is None or known.synthesis.weights is None):
             return self._weighed(model, light_field, u, v, cancelled)
-        if known is not None and (known.score is not None or light_field.at(u, v) is None):
+        if known is not None and (known.score is not None or not model.scored or light_field.at(u, v) is None):
             return known
         key = cache_key(light_field, model.prepare(), u, v)
         synthesis = known.synthesis if known is not None else self._from_disk(model, light_field, key, u, v)
@@ -216,7 +229,7 @@ class Engine:
             if self._store is not None:
                 self._unsaved[key] = None
         self.cache.put(key, synthesis)
-        return _answer(synthesis, final=True, kept=kept, score=self._keep_score(light_field, key, synthesis))
+        return _answer(synthesis, final=True, kept=kept, score=self._keep_score(model, light_field, key, synthesis))
 
     def _weighed(self, model: _Model, light_field: LightField, u: float, v: float, cancelled: Cancel) -> Answer:
         """Made by the model in any case, since weights are not kept on disk."""
@@ -225,9 +238,11 @@ class Engine:
         self.cache.put(key, synthesis)
         if self._store is not None and (key.u, key.v) not in self._stored:
             self._unsaved[key] = None
-        return _answer(synthesis, final=True, kept=False, score=self._keep_score(light_field, key, synthesis))
+        return _answer(synthesis, final=True, kept=False, score=self._keep_score(model, light_field, key, synthesis))
 
-    def _keep_score(self, light_field: LightField, key: CacheKey, synthesis: Synthesis) -> ScoreText | None:
+    def _keep_score(self, model: _Model, light_field: LightField, key: CacheKey, synthesis: Synthesis) -> ScoreText | None:
+        if not model.scored:
+            return None
         rule = self.rule
         found = _score(light_field, synthesis, rule)
         if found is not None:
@@ -311,7 +326,7 @@ class Engine:
         if synthesis is None:
             synthesis = model.synthesize(light_field, u, v, cancelled)
             self._keep_on_disk(key, synthesis)
-        self._keep_score(light_field, key, dataclasses.replace(synthesis, u=u, v=v))
+        self._keep_score(model, light_field, key, dataclasses.replace(synthesis, u=u, v=v))
 
     def has_room(self, light_field: LightField) -> bool:
         """Whether memory holds another view of this light field without driving one out."""

@@ -12,6 +12,7 @@ from app.exhibits import Exhibition, open_exhibition
 from assets import weights_path
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
+from lfcore.nearest_inputs import NEIGHBOURS, NearestInputs
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.store import ViewStore
 from lfcore.synthesis import Synthesizer
@@ -80,8 +81,8 @@ def preview(path: Path) -> LightField | None:
 
 DEFAULT_MODEL = "full"
 QUICK = "realtime"
-# lfcore.synthesizer.MODEL_NAMES, without importing torch.
-SHIPPED = ("full", "realtime", "single", "planesweep", "mean")
+# lfcore.synthesizer.MODEL_NAMES, without importing torch; and the small pair with nearer inputs.
+SHIPPED = ("full", "realtime", "single", "planesweep", "mean", NEIGHBOURS)
 
 
 # The networks take every core they find; the frame loop, which draws on the same cores where there is no GPU, comes first.
@@ -97,9 +98,9 @@ def synthesis_process() -> SynthesisProcess:
 def make_engine(model: str, cache_bytes: int, process: SynthesisProcess, store: ViewStore | None = None) -> Engine:
     """The engine on the named model or weight file. While the hand moves, the small networks stand in for larger ones."""
     quick = (lambda: RemoteSynthesizer(process, QUICK)) if weights_path(QUICK).is_file() else None
-    make = synthesizer_factory(model, process)
-    engine = Engine(make, cache_bytes, quick, store, Path(model).name)
-    engine.use(Path(model).name, make, is_slow(model))
+    choice, name = _choice(model, process), Path(model).name
+    engine = Engine(choice.make, cache_bytes, quick, store, name, choice.scored)
+    engine.use(name, choice)
     return engine
 
 
@@ -111,10 +112,17 @@ def is_slow(model: str) -> bool:
 def offered_models(model: str, process: SynthesisProcess) -> dict[str, ModelChoice]:
     """The models to choose from in the window, by name: the shipped ones, and the one that the program was started with."""
     names = dict.fromkeys([*SHIPPED, model])
-    return {Path(name).name: ModelChoice(synthesizer_factory(name, process), is_slow(name)) for name in names}
+    return {Path(name).name: _choice(name, process) for name in names}
+
+
+def _choice(model: str, process: SynthesisProcess) -> ModelChoice:
+    return ModelChoice(synthesizer_factory(model, process), is_slow(model), scored=model != NEIGHBOURS)
 
 
 def synthesizer_factory(model: str, process: SynthesisProcess) -> Callable[[], Synthesizer]:
     """What makes the synthesizer of the named model or weight file, which runs in the process, when called."""
+    if model == NEIGHBOURS:
+        make = synthesizer_factory(QUICK, process)
+        return lambda: NearestInputs(make())
     file = weights_path(model) if model in SHIPPED else Path(model)
     return lambda: RemoteSynthesizer(process, model, stated=read_stated(file))

@@ -43,6 +43,7 @@ class Compared:
     mapped: bool = False  # the map of their difference that is looked at has been computed
     table: tuple[tuple[str, ScoreText | None], ...] = ()  # models and their scores against the captured view
     views: tuple[ScoreText | None, ...] = ()  # of this model, by number of the captured view
+    never_scored: frozenset[str] = frozenset()  # models whose inputs are captured views
 
 
 @dataclass(frozen=True)

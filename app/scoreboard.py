@@ -29,7 +29,8 @@ class Scoreboard:
             self.views, self._unscored = (), ()
             return
         found = self._engine.scores(light_field)
-        self._unscored = tuple(point for point in captured_viewpoints(grid) if rounded(*point) not in found)
+        missing = captured_viewpoints(grid) if self._engine.scored else []
+        self._unscored = tuple(point for point in missing if rounded(*point) not in found)
         self.views = tuple(found.get(rounded(*grid.position(index))) for index in range(grid.rows * grid.columns))
 
     def table(self, light_field: LightField, here: Point) -> tuple[tuple[str, ScoreText | None], ...]:
@@ -39,9 +40,14 @@ class Scoreboard:
     def missing_model(self, light_field: LightField, here: Point) -> str | None:
         """A model whose score at a captured viewpoint is still to be found."""
         for model, score in self.table(light_field, here):
-            if score is None and not self._engine.failed_by(model):
+            if score is None and self._engine.scored_by(model) and not self._engine.failed_by(model):
                 return model
         return None
+
+    @property
+    def never_scored(self) -> frozenset[str]:
+        """The models whose pictures are not scored against captured views."""
+        return frozenset(model for model in self._models if not self._engine.scored_by(model))
 
     def missing_view(self, here: Point, among: Container[Point] | None = None) -> Point | None:
         """The nearest captured viewpoint that has no score yet; `among`: only these, as caches know them."""

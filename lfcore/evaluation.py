@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lfcore import colormaps
+from lfcore.errors import InputError
 from lfcore.figures import ByteArray, Cell, Legend, disparity_cell, figure
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import absolute_error, to_uint8
+from lfcore.nearest_inputs import NEIGHBOURS, NearestInputs
 from lfcore.protocols import K16, Protocol, novel_views
 
 if TYPE_CHECKING:
@@ -110,6 +112,15 @@ def views_to_score(light_field: LightField, protocol: Protocol, whole_grid: bool
     return novel_views(grid) if whole_grid else own
 
 
+def check_inputs(synthesizer: Synthesizer) -> None:
+    """Raise InputError for a model that is given other views than the corners."""
+    if isinstance(synthesizer, NearestInputs):
+        raise InputError(
+            f"The model {NEIGHBOURS} takes captured views between the corners as inputs, but protocols score what is made "
+            "of the four corners alone; score realtime, whose networks it uses."
+        )
+
+
 def evaluate_scene(
     light_field: LightField,
     synthesizer: Synthesizer,
@@ -120,8 +131,9 @@ def evaluate_scene(
     """Synthesize the protocol's views from the corners of its grid alone and score them.
 
     `whole_grid` scores every novel view too; the scene's own score stays that of the protocol. `on_view` is called after each
-    view. Raises InputError where the light field does not fit the protocol.
+    view. Raises InputError where the light field does not fit the protocol, and for a model with other inputs.
     """
+    check_inputs(synthesizer)
     grid = protocol.grid(light_field)
     own = set(protocol.views(grid))
     shown = protocol.shown_view(grid)

@@ -18,6 +18,7 @@ from torch import Tensor
 from lfcore.errors import Cancelled, InputError
 from lfcore.lightfield import CORNERS, FloatArray, LightField, check_viewpoint
 from lfcore.models import Model
+from lfcore.nearest_inputs import NEIGHBOURS, NearestInputs
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, sweep_luminance
 from lfcore.planesweep import Window, plane_sweep
 from lfcore.synthesis import Synthesis, Synthesizer, never
@@ -85,11 +86,11 @@ class MeanSynthesizer:
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
 
 
-MODEL_NAMES = ("full", "realtime", "single", "planesweep", "mean")
+MODEL_NAMES = ("full", "realtime", "single", "planesweep", "mean")  # by the four corners; NEIGHBOURS has other inputs
 
 
 def make_synthesizer(model: str | Path = "full") -> Synthesizer:
-    """The synthesizer of a shipped model (one of MODEL_NAMES) or of a weight file.
+    """The synthesizer of a shipped model (one of MODEL_NAMES, or NEIGHBOURS) or of a weight file.
 
     Raises InputError for an unknown name, WeightsError for a damaged or foreign file.
     """
@@ -98,6 +99,8 @@ def make_synthesizer(model: str | Path = "full") -> Synthesizer:
 
     if model == "mean":
         return MeanSynthesizer()
+    if model == NEIGHBOURS:
+        return NearestInputs(make_synthesizer("realtime"))
     if model == "planesweep":
         from lfcore.classical import PlaneSweepSynthesizer
 
@@ -108,7 +111,8 @@ def make_synthesizer(model: str | Path = "full") -> Synthesizer:
         path = Path(model)
     else:
         raise InputError(
-            f"Unknown model {str(model)!r}: choose one of {', '.join(MODEL_NAMES)}, or the path of a .safetensors file."
+            f"Unknown model {str(model)!r}: choose one of {', '.join((*MODEL_NAMES, NEIGHBOURS))}, or the path of a "
+            ".safetensors file."
         )
     weights = load_weights(path)
     return synthesizer_of(weights.model, weights.digest)

@@ -41,9 +41,13 @@ class Shifted(TruthSynthesizer):
 class Program:
     """A controller with two models and one that cannot be loaded, and with a clock of its own."""
 
-    def __init__(self, store: ViewStore | None = None, cache_bytes: int = 64 * 2**20) -> None:
+    def __init__(
+        self, store: ViewStore | None = None, cache_bytes: int = 64 * 2**20, never_scored: frozenset[str] = frozenset()
+    ) -> None:
         self.models = {"first": Shifted("first", 0.01), "second": Shifted("second", 0.03)}
-        choices = {name: ModelChoice(lambda made=made: made, False) for name, made in self.models.items()}
+        choices = {
+            name: ModelChoice(lambda made=made: made, False, name not in never_scored) for name, made in self.models.items()
+        }
         choices["broken"] = ModelChoice(broken, False)
         engine = Engine(choices["first"].make, cache_bytes, None, store, "first")
         self.controller = Controller(engine, lambda *_: light_field(), lambda: None, "first", models=choices)

@@ -13,6 +13,7 @@ from app.engine import Engine, ModelChoice
 from app.opening import SHIPPED, is_slow, offered_models
 from app.state import Step
 from lfcore.errors import WeightsError
+from lfcore.nearest_inputs import NEIGHBOURS
 from lfcore.remote import SynthesisProcess
 from lfcore.synthesis import Synthesis, Synthesizer
 from lfcore.synthesizer import MODEL_NAMES
@@ -99,8 +100,12 @@ def test_a_model_that_cannot_be_loaded_says_so_and_another_can_be_chosen() -> No
 
 
 def test_the_shipped_models_are_offered_and_a_weight_file_besides() -> None:
-    assert SHIPPED == MODEL_NAMES
+    assert (*MODEL_NAMES, NEIGHBOURS) == SHIPPED
     process = SynthesisProcess()  # never started
-    assert list(offered_models("full", process)) == list(SHIPPED)
+    offered = offered_models("full", process)
+    assert list(offered) == list(SHIPPED)
+    assert [name for name, choice in offered.items() if not choice.scored] == [NEIGHBOURS]
+    made = offered[NEIGHBOURS].make()
+    assert made.name == NEIGHBOURS and process.pid is None  # its key is read from the file of the small networks
     assert list(offered_models("some/where/mine.safetensors", process)) == [*SHIPPED, "mine.safetensors"]
     assert is_slow("full") and is_slow("mine.safetensors") and not is_slow("mean")

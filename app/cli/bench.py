@@ -23,7 +23,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         action="append",
         dest="models",
         metavar="NAME",
-        help="a shipped model or a .safetensors file; may be given more than once (default: every shipped model)",
+        help="a shipped model or a .safetensors file; may be given more than once (default: all shipped ones from corners)",
     )
     parser.add_argument("--count", type=count, default=5, metavar="N", help="viewpoints timed after the warm-up (default: 5)")
     parser.add_argument("--retune", action="store_true", help="first choose anew how convolutions are laid out on this machine")

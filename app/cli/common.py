@@ -52,7 +52,9 @@ def add_model(parser: argparse.ArgumentParser) -> None:
         default="full",
         metavar="NAME",
         help="full (the paper's two networks, default), realtime (a small pair of this program's), single (one network, "
-        "without disparity), planesweep (without networks), mean (average of the corners), or a .safetensors file",
+        "without disparity), planesweep (without networks), mean (average of the corners), neighbours (realtime, from "
+        "the four captured views around the viewpoint in place of the corners: best from a whole capture), or a "
+        ".safetensors file",
     )
 
 

@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
         check_target(options.report, (".html", ".htm"))
     scenes = scenes_in(options.paths)
 
-    from lfcore.evaluation import Evaluation
+    from lfcore.evaluation import Evaluation, check_inputs
     from lfcore.machine import machine
     from lfcore.protocols import PROTOCOLS
     from lfcore.synthesizer import make_synthesizer
@@ -111,6 +111,8 @@ def run(options: argparse.Namespace) -> int:
     curves = {str(path): read_curve(path) for path in options.curves}
     protocol = PROTOCOLS[options.protocol.lower()]
     models = {label: make_synthesizer(name) for label, name in labelled(options.models or ["full"]).items()}
+    for synthesizer in models.values():
+        check_inputs(synthesizer)
     found = _score_all(scenes, models, protocol, options)
     for failure in found.failures:
         print(f"lfview: {failure}", file=sys.stderr)

@@ -15,6 +15,8 @@ from app.sidebar import score_map
 from app.state import GAIN_LIMITS, Look
 from app.widgets import DASH, choice, decibels, em, heading, number, slider, text, tile, tooltip
 
+NEVER_SCORED = "Not scored: captured views are its inputs"
+
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     """The whole tab."""
@@ -27,7 +29,8 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     _table(readout)
     if readout.grid is not None:
         total = score_map.summary(readout.grid, readout.compared.views)
-        heading(f"All captured views: {total.scored} of {total.views} scored", fonts)
+        scored = f"{total.scored} of {total.views}" if readout.model not in readout.compared.never_scored else "none"
+        heading(f"All captured views: {scored} scored", fonts)
         score_map.draw(context, readout, readout.grid, total)
 
 
@@ -85,6 +88,8 @@ def _score(context: Context, readout: Readout) -> None:
 
 def _why_no_score(context: Context, readout: Readout) -> str:
     partner = context.state.comparison.partner
+    if partner == CAPTURED_VIEW and readout.model in readout.compared.never_scored:
+        return NEVER_SCORED
     if partner == CAPTURED_VIEW:
         there = readout.captured_here is not None
         return "Scored when the synthesis is there" if there else "No captured view at this viewpoint"
@@ -103,7 +108,8 @@ def _table(readout: Readout) -> None:
             imgui.table_next_row()
             imgui.table_next_column()
             text(name, theme.TEXT if name == readout.model else theme.TEXT_SOFT)
-            _cells(score, score is not None and score.psnr == best, hint)
+            why_none = NEVER_SCORED if name in readout.compared.never_scored else hint
+            _cells(score, score is not None and score.psnr == best, why_none)
         imgui.end_table()
     imgui.pop_style_var()
 

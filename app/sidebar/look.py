@@ -14,6 +14,7 @@ from app.state import GAIN_LIMITS, TAIL_LIMITS, Look
 from app.tone import CURVE_MEANING, GAMMA_LIMITS, STOPS_LIMITS, Curve
 from app.widgets import choice, em, heading, number, slider, switch, text, tile, tooltip
 from lfcore.colormaps import ColourMap
+from lfcore.nearest_inputs import NEIGHBOURS
 
 _TILES = (
     ("Synthesis", "synthesis", Look.SYNTHESIS),
@@ -83,7 +84,8 @@ def _tone(context: Context) -> None:
 def _model(context: Context, readout: Readout) -> None:
     """Which model makes the picture for a hand at rest."""
     if readout.models:
-        hint = "The model that makes the picture when the hand rests.  (M: the next one)"
+        hint = f"The model that makes the picture when the hand rests; {NEIGHBOURS}: the small networks of realtime, from the "
+        hint += "four captured views around the viewpoint in place of the corners.  (M: the next one)"
         chosen = choice("Model", readout.model, readout.models, hint)
         if chosen != readout.model:
             context.state.model = chosen

@@ -102,7 +102,8 @@ def _words(readout: Readout, grid: Grid, index: int) -> str:
     scores = readout.compared.views
     score = scores[index] if index < len(scores) else None
     if score is None:
-        return f"{name}: not scored yet. A click goes there."
+        why = "not scored yet" if readout.model not in readout.compared.never_scored else "an input, not scored"
+        return f"{name}: {why}. A click goes there."
     return f"{name}: {decibels(score.psnr)}, SSIM {number(score.ssim, 4)} ({score.protocol}). A click goes there."
 
 

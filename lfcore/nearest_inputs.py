@@ -1,0 +1,162 @@
+"""Synthesis from the four captured views around the viewpoint, in place of the four corners.
+
+The paper's setting is four views and no more. Of a whole capture there are others between them, and the nearer the inputs, the
+better the picture. Captured views are its inputs then, so it has no score by any protocol of this program.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lfcore.coarse_colours import CoarseColours
+from lfcore.errors import InputError
+from lfcore.lightfield import CORNERS, EXTRAPOLATION_LIMIT, FloatArray, LightField, check_viewpoint
+from lfcore.synthesis import LateSynthesis, Synthesis, Synthesizer, WeighingSynthesizer, never, weighs
+
+NEIGHBOURS = "neighbours"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Four captured views, the corners of a part of the grid. All numbers count views."""
+
+    row: int  # of the upper two
+    column: int  # of the left two
+    rows: int  # from the upper to the lower ones
+    columns: int  # from the left to the right ones
+
+    def of(self, light_field: LightField) -> LightField:
+        """The four views as a light field of their own; it shares the memory of the whole."""
+        views = light_field.views[self.row :: self.rows, self.column :: self.columns][:2, :2]
+        return replace(light_field, views=views, dark=frozenset())
+
+    def within(self, light_field: LightField, u: float, v: float) -> tuple[float, float]:
+        """(u, v) of the whole in units of the cell: from 0 to 1 between its views."""
+        return (
+            (u * (light_field.columns - 1) - self.column) / self.columns,
+            (v * (light_field.rows - 1) - self.row) / self.rows,
+        )
+
+    def share(self, light_field: LightField) -> float:
+        """Its side, in units of the baseline from corner to corner of the whole."""
+        return self.columns / (light_field.columns - 1)
+
+
+def cell_around(light_field: LightField, u: float, v: float) -> Cell:
+    """The smallest cell around (u, v) in which no view is dark; where there is none, the whole grid.
+
+    Its sides are equal parts of the baselines, since one disparity holds along both; on a grid of V x U views there are as many
+    parts as (V - 1) and (U - 1) have in common. Of several cells, that with its middle nearest. Beyond the corners cells grow:
+    none is left by more than EXTRAPOLATION_LIMIT of its side. Raises InputError outside the allowed range.
+    """
+    check_viewpoint(u, v)
+    parts = math.gcd(light_field.rows - 1, light_field.columns - 1)
+    for size in range(1, parts + 1):
+        rows, columns = ((count - 1) // parts * size for count in (light_field.rows, light_field.columns))
+        fitting = [cell for cell in _cells(light_field, rows, columns) if _fits(cell, light_field, u, v)]
+        if fitting:
+            return min(fitting, key=lambda cell: _distance(cell.within(light_field, u, v)))
+    return Cell(0, 0, light_field.rows - 1, light_field.columns - 1)
+
+
+def _cells(light_field: LightField, rows: int, columns: int) -> Iterator[Cell]:
+    for row, column in itertools.product(range(light_field.rows - rows), range(light_field.columns - columns)):
+        yield Cell(row, column, rows, columns)
+
+
+def _fits(cell: Cell, light_field: LightField, u: float, v: float) -> bool:
+    inside = cell.within(light_field, min(max(u, 0.0), 1.0), min(max(v, 0.0), 1.0))
+    if not all(0 <= place <= 1 for place in inside):
+        return False
+    if not all(-EXTRAPOLATION_LIMIT <= place <= 1 + EXTRAPOLATION_LIMIT for place in cell.within(light_field, u, v)):
+        return False
+    lines, places = (cell.row, cell.row + cell.rows), (cell.column, cell.column + cell.columns)
+    return light_field.dark.isdisjoint(itertools.product(lines, places))
+
+
+def _distance(place: tuple[float, float]) -> float:
+    """Of a place in a cell from its middle."""
+    return math.dist(place, (0.5, 0.5))
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """What a model has taken: the views of a cell, and their colours in the coarse."""
+
+    cell: Cell
+    coarse: FloatArray  # (4, h, w, 3), in the order of CORNERS
+
+    def colours(self, u: float, v: float) -> FloatArray:
+        """Those of a view at (u, v), in units of the cell: (h, w, 3)."""
+        shares = np.array([(1 - abs(p - u)) * (1 - abs(q - v)) for p, q in CORNERS], np.float32)
+        return np.tensordot(shares, self.coarse, 1)
+
+
+class NearestInputs:
+    """Another model, given the nearest inputs; see lfcore.synthesis.Synthesizer. Disparities are those of the whole grid.
+
+    The other takes the inputs over anew when the viewpoint goes from one cell to the next. Memory: the light field's own.
+
+    Networks that have learnt how a camera's corner views differ in colour from the views between them would change the colours
+    of neighbours too, which differ by less. So colours in the coarse are taken from the inputs, unless these are the corners.
+    """
+
+    name = NEIGHBOURS
+
+    def __init__(self, model: Synthesizer) -> None:
+        self._model = model
+        self.key = hashlib.blake2b(f"{NEIGHBOURS} {model.key}".encode(), digest_size=16).hexdigest()
+        self._light_field: LightField | None = None
+        self._colours: CoarseColours | None = None
+        self._inputs: _Inputs | None = None
+
+    @property
+    def weighs(self) -> bool:
+        """See WeighingSynthesizer."""
+        return weighs(self._model)
+
+    def set_light_field(self, light_field: LightField) -> None:
+        """See Synthesizer. The views around a viewpoint are handed on with its query."""
+        self._light_field, self._inputs = light_field, None
+        self._colours = CoarseColours(light_field.height, light_field.width)
+
+    def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        """See Synthesizer; the warped inputs are those of the cell, in the order of CORNERS."""
+        return self._asked(self._model.synthesize, u, v, cancelled)
+
+    def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+        """See WeighingSynthesizer."""
+        ask = self._model.synthesize_weighed if isinstance(self._model, WeighingSynthesizer) else self._model.synthesize
+        return self._asked(ask, u, v, cancelled)
+
+    def _asked(self, ask: Callable[..., Synthesis], u: float, v: float, cancelled: Callable[[], bool]) -> Synthesis:
+        if self._light_field is None or self._colours is None:
+            raise InputError("No light field is set; call set_light_field first.")
+        inputs = self._taken(self._light_field, self._colours, cell_around(self._light_field, u, v))
+        at, share = inputs.cell.within(self._light_field, u, v), inputs.cell.share(self._light_field)
+        found = ask(*at, cancelled)
+        image = found.image
+        if share < 1:
+            colours = inputs.colours(*at)
+            image = self._colours.spread(colours - self._colours.of(image)) + image
+            np.clip(image, 0, 1, out=image)
+        disparity = None if found.disparity is None else found.disparity / np.float32(share)
+        if isinstance(found, LateSynthesis):
+            late = LateSynthesis(u, v, self.name, image, disparity, None, found.timings, found.weights)
+            return late.with_warped(lambda: found.warped)
+        return Synthesis(u, v, self.name, image, disparity, found.warped, found.timings, found.weights)
+
+    def _taken(self, light_field: LightField, colours: CoarseColours, cell: Cell) -> _Inputs:
+        """The cell's views, which the model takes where it has others."""
+        if self._inputs is None or self._inputs.cell != cell:
+            self._inputs = None  # whatever the model has, should it fail
+            views = cell.of(light_field)
+            self._model.set_light_field(views)
+            self._inputs = _Inputs(cell, np.stack([colours.of(view) for view in views.corners()]))
+        return self._inputs
