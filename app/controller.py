@@ -37,6 +37,7 @@ from app.sway import Sway
 from lfcore.cache import rounded
 from lfcore.errors import LfviewError
 from lfcore.lightfield import LightField
+from lfcore.nearest_inputs import NEIGHBOURS, Cell, cell_around
 from lfcore.sweep_plan import is_plan_file
 
 REST_SECONDS = 0.08  # the hand counts as resting when the viewpoint has not moved for so long
@@ -294,6 +295,7 @@ class Controller:
             has_disparity=self._newest_disparity,
             disparity_under_cursor=self._disparity_under_cursor(),
             captured_here=self.captured_here,
+            inputs=self._inputs(),
             compared=self._compared(),
             focus=self._focus_facts(),
             weighed=newest is not None and newest.synthesis.weights is not None,
@@ -601,6 +603,13 @@ class Controller:
             return instant_ms
         seconds = synthesized.synthesis.timings.get("total")
         return None if seconds is None else 1e3 * seconds
+
+    def _inputs(self) -> frozenset[tuple[int, int]]:
+        if self.light_field is None:
+            return frozenset()
+        near = self._model == NEIGHBOURS
+        cell = cell_around(self.light_field, *self.viewpoint) if near else Cell.whole(self.light_field)
+        return frozenset(cell.places)
 
     def _busy(self) -> str:
         wish = self._asking.wish

@@ -70,6 +70,7 @@ class Readout:
     has_disparity: bool = False
     disparity_under_cursor: float | None = None
     captured_here: int | None = None  # number of the captured view at (u, v)
+    inputs: frozenset[tuple[int, int]] = frozenset()  # (row, column) of the captured views that the model is given there
     compared: Compared = field(default_factory=Compared)
     focus: FocusFacts = field(default_factory=FocusFacts)
     weighed: bool = False  # the weights of the inputs in the newest synthesis are known

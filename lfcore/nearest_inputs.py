@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,17 @@ class Cell:
     column: int  # of the left two
     rows: int  # from the upper to the lower ones
     columns: int  # from the left to the right ones
+
+    @classmethod
+    def whole(cls, light_field: LightField) -> Cell:
+        """The one whose views are the corners of the grid."""
+        return cls(0, 0, light_field.rows - 1, light_field.columns - 1)
+
+    @property
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """(row, column) of its views, row by row."""
+        lines, places = (self.row, self.row + self.rows), (self.column, self.column + self.columns)
+        return tuple(itertools.product(lines, places))
 
     def of(self, light_field: LightField) -> LightField:
         """The four views as a light field of their own; it shares the memory of the whole."""
@@ -59,30 +70,19 @@ def cell_around(light_field: LightField, u: float, v: float) -> Cell:
     parts = math.gcd(light_field.rows - 1, light_field.columns - 1)
     for size in range(1, parts + 1):
         rows, columns = ((count - 1) // parts * size for count in (light_field.rows, light_field.columns))
-        fitting = [cell for cell in _cells(light_field, rows, columns) if _fits(cell, light_field, u, v)]
+        starts = _starts(light_field.rows, rows, v), _starts(light_field.columns, columns, u)
+        cells = [Cell(row, column, rows, columns) for row, column in itertools.product(*starts)]
+        fitting = [cell for cell in cells if light_field.dark.isdisjoint(cell.places)]
         if fitting:
-            return min(fitting, key=lambda cell: _distance(cell.within(light_field, u, v)))
-    return Cell(0, 0, light_field.rows - 1, light_field.columns - 1)
+            return min(fitting, key=lambda cell: math.dist(cell.within(light_field, u, v), (0.5, 0.5)))
+    return Cell.whole(light_field)
 
 
-def _cells(light_field: LightField, rows: int, columns: int) -> Iterator[Cell]:
-    for row, column in itertools.product(range(light_field.rows - rows), range(light_field.columns - columns)):
-        yield Cell(row, column, rows, columns)
-
-
-def _fits(cell: Cell, light_field: LightField, u: float, v: float) -> bool:
-    inside = cell.within(light_field, min(max(u, 0.0), 1.0), min(max(v, 0.0), 1.0))
-    if not all(0 <= place <= 1 for place in inside):
-        return False
-    if not all(-EXTRAPOLATION_LIMIT <= place <= 1 + EXTRAPOLATION_LIMIT for place in cell.within(light_field, u, v)):
-        return False
-    lines, places = (cell.row, cell.row + cell.rows), (cell.column, cell.column + cell.columns)
-    return light_field.dark.isdisjoint(itertools.product(lines, places))
-
-
-def _distance(place: tuple[float, float]) -> float:
-    """Of a place in a cell from its middle."""
-    return math.dist(place, (0.5, 0.5))
+def _starts(count: int, side: int, place: float) -> list[int]:
+    """The first views along an axis of so many, from which a side reaches around a place, 0 to 1 from end to end."""
+    inside, limit = min(max(place, 0.0), 1.0) * (count - 1), EXTRAPOLATION_LIMIT * side
+    outside = abs(place * (count - 1) - inside)
+    return [first for first in range(count - side) if first <= inside <= first + side and outside <= limit]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ from scenes import plane
 from test_comparing import Program
 
 from app.__main__ import main
+from app.controller import Controller
+from app.engine import Engine, ModelChoice
 from app.readout import Compared, Readout
 from app.sidebar import score_map
 from app.state import Grid, Tab
@@ -298,3 +300,15 @@ def test_the_map_of_scores_says_why_there_are_none() -> None:
     readout = Readout(model=NEIGHBOURS, grid=grid, compared=Compared(never_scored=frozenset({NEIGHBOURS})))
     assert "an input, not scored" in score_map._words(readout, grid, 1)
     assert "not scored yet" in score_map._words(replace(readout, model="full"), grid, 1)
+
+
+def test_the_window_tells_which_views_are_the_inputs(window: Program) -> None:
+    controller = window.controller
+    assert controller.readout(None).inputs == {(0, 0), (0, 2), (2, 0), (2, 2)}
+    choice = ModelChoice(lambda: NearestInputs(Blender("blender")), False, scored=False)
+    named = Controller(Engine(choice.make, 2**20, name=NEIGHBOURS), lambda *_: moving(), lambda: None, NEIGHBOURS)
+    assert not named.readout(None).inputs  # nothing is open
+    named.show_light_field(moving())
+    named.state.move_to(0.6, 0.3)
+    assert named.readout(None).inputs == {(0, 1), (0, 2), (1, 1), (1, 2)}
+    named.stop()

@@ -31,7 +31,10 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     if exporting and not imgui.is_item_active():
         tooltip("Drag to move the viewpoint. Line: the path; a right click adds or removes a key frame.  (K, Shift+K)")
     elif not imgui.is_item_active():
-        tooltip("Click or drag to move the viewpoint. Dots: captured views; blue: in the cache; rim: extrapolated.  (Arrows)")
+        tooltip(
+            "Click or drag to move the viewpoint. Dots: captured views, the larger ones the inputs; blue: in the cache; "
+            "rim: extrapolated.  (Arrows)"
+        )
 
     def at(point: Point) -> ImVec2:
         return ImVec2(
@@ -54,9 +57,10 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     if grid is not None:
         radius = min(em() * 0.14, size / _SPAN / max(grid.rows, grid.columns) * 0.25)
         for index in range(grid.rows * grid.columns):
-            dark = divmod(index, grid.columns) in grid.dark
-            colour = theme.FIELD_ACTIVE if dark else theme.TEXT_SOFT
-            brush.add_circle_filled(at(grid.position(index)), radius, packed(colour), _DOT_SIDES)
+            place = divmod(index, grid.columns)
+            given = place in readout.inputs
+            colour = theme.FIELD_ACTIVE if place in grid.dark else theme.TEXT if given else theme.TEXT_SOFT
+            brush.add_circle_filled(at(grid.position(index)), (1.7 if given else 1.0) * radius, packed(colour), _DOT_SIDES)
     if exporting:
         for stop in drawn_path(state.export):
             brush.path_line_to(at((stop.u, stop.v)))
