@@ -9,7 +9,6 @@ import pytest
 import torch
 from scenes import plane
 
-from assets import weights_path
 from lfcore.compact import CompactModel
 from lfcore.compact_synthesizer import CompactSynthesizer
 from lfcore.errors import InputError
@@ -18,7 +17,7 @@ from lfcore.lightfield import CORNERS, LightField
 from lfcore.models import TRAINABLE
 from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel, initialise
-from lfcore.planesweep import Levels, Window
+from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
 from lfcore.training.architectures import Batch, Prediction, architecture
 from lfcore.training.conditioning import mixing_matrix
@@ -347,52 +346,6 @@ def test_at_an_edge_of_the_picture_the_papers_pair_is_trained_on_what_it_is_used
     expected = synthesizer.synthesize(group.u, group.v)
     inner = slice(w.top + found.border, w.bottom - found.border), slice(w.left + found.border, w.right - found.border)
     np.testing.assert_allclose(found.image[0].clamp(0, 1).permute(1, 2, 0), expected.image[inner], atol=1e-4)
-
-
-def test_at_an_edge_of_the_picture_the_small_pair_is_scored_on_what_it_is_used_for() -> None:
-    """A patch that is a whole picture: its edges are those for which the synthesizer fills up with zeros too."""
-    rng = np.random.default_rng(4)
-    field = plane(3.0, (2, 2), (64, 80))
-    inputs = field.corners().transpose(0, 3, 1, 2)[:, None]  # (4, 1, 3, H, W)
-    group = PatchGroup(inputs, rng.random((1, 3, 64, 80), np.float32), Window(0, 64, 0, 80), 0.3, 0.6)
-    weights = load_weights(weights_path("realtime"))
-    assert isinstance(weights.model, CompactModel)
-    batch = Batch.of([group], torch.device("cpu"))
-    with torch.no_grad():
-        found = architecture("realtime").predict(weights.model, batch, lambda: torch.autocast("cpu", enabled=False))
-    synthesizer = CompactSynthesizer(weights.model, "same", Tuning())
-    synthesizer.set_light_field(field)
-    expected = synthesizer.synthesize(group.u, group.v)
-    assert found.scored is not None and bool(found.scored.all())
-    np.testing.assert_allclose(found.image[0].clamp(0, 1).permute(1, 2, 0), expected.image, atol=2e-3)
-
-
-def test_within_the_picture_the_rim_of_a_patch_is_not_scored() -> None:
-    inputs, target = np.zeros((4, 1, 3, 100, 100), np.float32), np.zeros((1, 3, 60, 60), np.float32)
-    batch = Batch.of([PatchGroup(inputs, target, Window(0, 60, 40, 100), 0.3, 0.6)], torch.device("cpu"))  # top right
-    with torch.no_grad():
-        found = architecture("realtime").predict(CompactModel(), batch, lambda: torch.autocast("cpu", enabled=False))
-    expected = np.zeros((60, 60))
-    expected[:52, 8:] = 1
-    assert found.scored is not None
-    np.testing.assert_array_equal(found.scored[0, 0], expected)
-
-
-def test_what_is_not_scored_has_no_part_in_the_loss() -> None:
-    """The error that is reported is the mean over what is scored."""
-    image, targets = torch.rand(2, 3, 40, 40), torch.rand(2, 3, 40, 40)
-    scored = torch.zeros(2, 1, 40, 40)
-    scored[0, :, 5:, :30], scored[1, :, :] = 1, 1
-
-    class Known(type(architecture("realtime"))):  # type: ignore[misc]
-        def predict(self, *_: object) -> Prediction:
-            return Prediction(image, 0, None, 0, scored)
-
-    loss = StepLoss(CompactModel(), Known(), LossConfig(matching_steps=0), bfloat16=False)
-    error, _ = loss(Batch([], [], targets, [], torch.zeros(2, 2)), 0)
-    squares = (image - targets).square()
-    expected = (squares[0, :, 5:, :30].mean() + squares[1].mean()) / 2
-    assert float(error) == pytest.approx(float(expected), rel=1e-5)
 
 
 def test_only_the_small_pair_can_teach(tmp_path: Path) -> None:

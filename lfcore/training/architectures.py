@@ -63,7 +63,6 @@ class Prediction:
     border: int
     disparity: Tensor | None  # (sum of B, 1, P - 2 disparity_border, P - 2 disparity_border)
     disparity_border: int
-    scored: Tensor | None = None  # (sum of B, 1, P - 2 border, P - 2 border), 1 where the picture is scored; None: everywhere
 
 
 class Architecture(Protocol):
@@ -135,8 +134,7 @@ class PaperPair:
 
 
 class CompactPair:
-    """The small pair. Its convolutions fill up with zeros at the edge of a patch: a rim is not scored, but where that edge is
-    one of the picture: there the synthesizer does the same."""
+    """The small pair. Its convolutions fill up with zeros at the edge of a patch, so a rim of the picture is not scored."""
 
     RIM = 8
 
@@ -166,20 +164,8 @@ class CompactPair:
         warped = _toned_and_warped(places, batch, disparity)
         with autocast():
             image = model.colour(warped, disparity, batch.positions)  # (., 3, P, P)
-        return Prediction(image, 0, disparity, 0, self._scored(batch))
-
-    def _scored(self, batch: Batch) -> Tensor:
-        """See Prediction."""
-        scored = torch.zeros_like(batch.targets[:, :1])
-        for part, images, group in zip(scored.split(batch.sizes), batch.inputs, batch.groups, strict=True):
-            (height, width), w = images.shape[-2:], group.window
-            before, after = (w.top, w.left), (height - w.bottom, width - w.right)
-            rows, columns = (
-                slice(self.RIM if room else 0, length - self.RIM if room_after else length)
-                for room, room_after, length in zip(before, after, w.shape, strict=True)
-            )
-            part[:, :, rows, columns] = 1
-        return scored
+        inside = slice(self.RIM, -self.RIM)
+        return Prediction(image[:, :, inside, inside], self.RIM, disparity, 0)
 
     def disparity(self, model: CompactModel, batch: Batch, autocast: Autocast) -> Tensor:
         """The disparity alone, (sum of B, 1, P, P): what another model can be taught."""

@@ -47,8 +47,9 @@ class StepLoss(nn.Module):
     def forward(self, batch: Batch, step: int) -> tuple[Tensor, Tensor]:
         """(mean squared error over RGB, loss), both scalars."""
         prediction = self._architecture.predict(self.model, batch, self._autocast)
-        inner = cut(batch.targets, prediction.border)
-        errors = _mean((prediction.image - inner).square(), prediction.scored)  # (B,)
+        inside = slice(prediction.border, -prediction.border)
+        inner = batch.targets[:, :, inside, inside]
+        errors = (prediction.image - inner).square().mean((1, 2, 3))  # (B,)
         # Dark and flat patches have small errors; balanced, they teach as much as bright ones.
         loss = (errors / (inner.var((1, 2, 3)) + 0.005) ** self._config.balance).mean()
         fading = 1 - step / max(self._config.matching_steps, 1)
@@ -87,13 +88,6 @@ def _matching_loss(batch: Batch, prediction: Prediction) -> Tensor:
         error = F.smooth_l1_loss(disparity, found + group.shift, reduction="none")
         return (confidence * error).mean()  # one group a step is enough, and costs less than all
     return 0 * prediction.disparity.sum()
-
-
-def _mean(values: Tensor, counted: Tensor | None) -> Tensor:
-    """Mean of each patch (B, C, H, W) over what counts (B, 1, H, W): (B,)."""
-    if counted is None:
-        return values.mean((1, 2, 3))
-    return (values.mean(1, keepdim=True) * counted).sum((1, 2, 3)) / counted.sum((1, 2, 3))
 
 
 def cut(planes: Tensor, border: int) -> Tensor:
