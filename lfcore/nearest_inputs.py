@@ -16,7 +16,7 @@ import numpy as np
 
 from lfcore.coarse_colours import CoarseColours
 from lfcore.errors import InputError
-from lfcore.lightfield import CORNERS, EXTRAPOLATION_LIMIT, FloatArray, LightField, check_viewpoint
+from lfcore.lightfield import EXTRAPOLATION_LIMIT, FloatArray, LightField, check_viewpoint
 from lfcore.synthesis import LateSynthesis, Synthesis, Synthesizer, WeighingSynthesizer, never, weighs
 
 NEIGHBOURS = "neighbours"
@@ -85,17 +85,27 @@ def _starts(count: int, side: int, place: float) -> list[int]:
     return [first for first in range(count - side) if first <= inside <= first + side and outside <= limit]
 
 
-@dataclass(frozen=True)
-class _Inputs:
-    """What a model has taken: the views of a cell, and their colours in the coarse."""
+class _Colours:
+    """Colours of the captured views in the coarse, found when first asked for; they take a hundredth of a view's memory."""
 
-    cell: Cell
-    coarse: FloatArray  # (4, h, w, 3), in the order of CORNERS
+    def __init__(self, light_field: LightField) -> None:
+        self._light_field = light_field
+        self._coarse = CoarseColours(light_field.height, light_field.width)
+        self._known: dict[tuple[int, int], FloatArray] = {}
 
-    def colours(self, u: float, v: float) -> FloatArray:
-        """Those of a view at (u, v), in units of the cell: (h, w, 3)."""
-        shares = np.array([(1 - abs(p - u)) * (1 - abs(q - v)) for p, q in CORNERS], np.float32)
-        return np.tensordot(shares, self.coarse, 1)
+    def given_to(self, image: FloatArray, cell: Cell, at: tuple[float, float]) -> FloatArray:
+        """The image (H, W, 3) at a place in the cell with the colours of the cell's views there, by nearness; 0 to 1."""
+        u, v = (min(max(place, 0.0), 1.0) for place in at)
+        shares = (1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v
+        wanted = sum(np.float32(share) * self._of(place) for share, place in zip(shares, cell.places, strict=True))
+        coloured = self._coarse.spread(wanted - self._coarse.of(image))
+        coloured += image
+        return np.clip(coloured, 0, 1, out=coloured)
+
+    def _of(self, place: tuple[int, int]) -> FloatArray:
+        if place not in self._known:
+            self._known[place] = self._coarse.of(self._light_field.view(*place))
+        return self._known[place]
 
 
 class NearestInputs:
@@ -113,8 +123,8 @@ class NearestInputs:
         self._model = model
         self.key = hashlib.blake2b(f"{NEIGHBOURS} {model.key}".encode(), digest_size=16).hexdigest()
         self._light_field: LightField | None = None
-        self._colours: CoarseColours | None = None
-        self._inputs: _Inputs | None = None
+        self._colours: _Colours | None = None
+        self._cell: Cell | None = None  # the one whose views the model has taken
 
     @property
     def weighs(self) -> bool:
@@ -123,8 +133,7 @@ class NearestInputs:
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer. The views around a viewpoint are handed on with its query."""
-        self._light_field, self._inputs = light_field, None
-        self._colours = CoarseColours(light_field.height, light_field.width)
+        self._light_field, self._colours, self._cell = light_field, _Colours(light_field), None
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         """See Synthesizer; the warped inputs are those of the cell, in the order of CORNERS."""
@@ -136,27 +145,19 @@ class NearestInputs:
         return self._asked(ask, u, v, cancelled)
 
     def _asked(self, ask: Callable[..., Synthesis], u: float, v: float, cancelled: Callable[[], bool]) -> Synthesis:
-        if self._light_field is None or self._colours is None:
+        light_field = self._light_field
+        if light_field is None or self._colours is None:
             raise InputError("No light field is set; call set_light_field first.")
-        inputs = self._taken(self._light_field, self._colours, cell_around(self._light_field, u, v))
-        at, share = inputs.cell.within(self._light_field, u, v), inputs.cell.share(self._light_field)
+        cell = cell_around(light_field, u, v)
+        if cell != self._cell:
+            self._cell = None  # whatever the model has, should it fail
+            self._model.set_light_field(cell.of(light_field))
+            self._cell = cell
+        at, share = cell.within(light_field, u, v), cell.share(light_field)
         found = ask(*at, cancelled)
-        image = found.image
-        if share < 1:
-            colours = inputs.colours(*at)
-            image = self._colours.spread(colours - self._colours.of(image)) + image
-            np.clip(image, 0, 1, out=image)
+        image = found.image if share == 1 else self._colours.given_to(found.image, cell, at)
         disparity = None if found.disparity is None else found.disparity / np.float32(share)
         if isinstance(found, LateSynthesis):
             late = LateSynthesis(u, v, self.name, image, disparity, None, found.timings, found.weights)
             return late.with_warped(lambda: found.warped)
         return Synthesis(u, v, self.name, image, disparity, found.warped, found.timings, found.weights)
-
-    def _taken(self, light_field: LightField, colours: CoarseColours, cell: Cell) -> _Inputs:
-        """The cell's views, which the model takes where it has others."""
-        if self._inputs is None or self._inputs.cell != cell:
-            self._inputs = None  # whatever the model has, should it fail
-            views = cell.of(light_field)
-            self._model.set_light_field(views)
-            self._inputs = _Inputs(cell, np.stack([colours.of(view) for view in views.corners()]))
-        return self._inputs

@@ -175,6 +175,8 @@ def test_colours_in_the_coarse_are_those_of_the_inputs() -> None:
     expected = np.float32([0.3 + 1 / 20, 0.3 + 0.5 / 20, 0.3])
     np.testing.assert_allclose(image.mean((0, 1)), expected, atol=1e-3)
     np.testing.assert_allclose(image[:, 21] - image[:, 20], 0.1, atol=2e-3)  # what is finer stays
+    beyond = found.synthesize(0.75, -0.05).image  # as at the edge
+    np.testing.assert_allclose(beyond.mean((0, 1)), np.float32([0.3 + 1.5 / 20, 0.3, 0.3]), atol=1e-3)
     corners = replace(field, views=field.views[::2, ::2])
     found.set_light_field(corners)
     alone = found.synthesize(0.5, 0.5).image
