@@ -12,7 +12,19 @@ import torch
 from torch import Tensor, nn
 
 from lfcore.compact import DEVIATION_SCALE, CompactModel, ResidualBlock, log_nearness
-from lfcore.compact_parts import LOGITS, MIDDLE, PHASES, Gathered, Heads, gathered_order, input_shares, parts_of
+from lfcore.compact_parts import (
+    LOGITS,
+    MIDDLE,
+    PHASES,
+    Gathered,
+    Heads,
+    as_rows,
+    gathered_order,
+    input_shares,
+    level_costs,
+    parts_of,
+)
+from lfcore.expected_disparities import expected
 from lfcore.layers import Layer, UnsetConvolution, make_layer
 from lfcore.tuned_stack import Tuning
 
@@ -44,10 +56,9 @@ class CompactInference:
             # By phase, then channel: so that a pixel's channels stay together when the phases are put side by side.
             self._rise = self._layer(disparity.rise, outputs=_by_phase(config.fine_width))
             self._join = self._layer(disparity.join)
-            self._parts = parts_of(
-                Heads(_matrix(disparity.score), _matrix(disparity.spread), config.levels.values(), float(disparity.sharpness)),
-                tuning.dtype,
-            )
+            score, spread = _matrix(disparity.score), _matrix(disparity.spread)
+            self._heads = Heads(score, spread, config.levels.values(), float(disparity.sharpness))
+            self._parts = parts_of(self._heads, tuning.dtype)
             x_scale = torch.cat((torch.full((12,), 4.0), torch.full((48,), 10.0), torch.ones(2), torch.full((2,), 0.2)))
             order = gathered_order()
             self._colour_stem = self._layer(colour.stem, x_scale, order)
@@ -80,12 +91,23 @@ class CompactInference:
         """Corner views (4, 3, H, W) in the root tone, continued beyond their edges, as `warp` takes them."""
         return self._parts.prepared(toned - MIDDLE)
 
+    def expect(self, deviations: Tensor) -> None:
+        """From now on, prefer disparities that a light field is sure to have, by the (1, L, h, w) of its sweep."""
+        heads, costs = self._heads, level_costs(deviations)
+        probabilities = heads.probabilities(as_rows(self._hidden(deviations)), costs)
+        limits = expected(probabilities, costs, heads.values)
+        self._parts = parts_of(heads if limits is None else heads.lowered(limits.penalties(heads.values)), self.dtype)
+
     def disparity(self, deviations: Tensor) -> Tensor:
         """(1, L, h, w) of the sweep, channels_last, to the phases (4, h, w) of the disparity, px."""
+        return self._parts.disparity(self._hidden(deviations), deviations)
+
+    def _hidden(self, deviations: Tensor) -> Tensor:
+        """The disparity network's last hidden channels, (1, C, h, w)."""
         coarse = _residuals(self._stem(deviations), self._blocks)
         risen = _side_by_side(self._rise(coarse, of_positive=True, positive=True))
         fine = self._skip(deviations, plus=risen, positive=True)
-        return self._parts.disparity(self._join(fine, plus=fine, positive=True), deviations)
+        return self._join(fine, plus=fine, positive=True)
 
     def warp(self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]) -> Gathered:
         """`prepared` corners, continued by `reach` px, warped by the phases of a disparity. offsets: (4, 2), p_i - q;

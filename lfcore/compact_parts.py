@@ -7,7 +7,7 @@ channels_last order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import torch
@@ -37,6 +37,15 @@ class Heads:
     spread: tuple[Tensor, Tensor]  # of nine neighbours for each phase: (36, C), (36,), by phase, then neighbour
     values: Tensor  # (L,), px
     sharpness: float  # how steeply a level's score falls with its deviation
+
+    def lowered(self, penalties: Tensor) -> Heads:
+        """With this (L,) taken off the scores of the levels."""
+        matrix, bias = self.score
+        return replace(self, score=(matrix, bias - penalties))
+
+    def probabilities(self, pixels: Tensor, costs: Tensor) -> Tensor:
+        """Of each level at pixels, by their hidden channels (N, C) and their costs (N, L): (N, L)."""
+        return torch.addmm(self.score[1], pixels, self.score[0].T).sub_(costs, alpha=self.sharpness).softmax(1)
 
 
 @dataclass(frozen=True)
@@ -136,11 +145,8 @@ class TorchParts:
     def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
         _, _, h, w = pixels.shape
         heads = self._heads
-        rows = pixels.permute(0, 2, 3, 1).reshape(h * w, -1).float()  # (h w, C)
-        agreement = mean_around(deviations.to(torch.float32, memory_format=torch.channels_last), AGREEMENT_REACH)
-        scores = torch.addmm(heads.score[1], rows, heads.score[0].T)  # (h w, L)
-        scores.sub_(agreement.permute(0, 2, 3, 1).reshape(h * w, -1), alpha=heads.sharpness)
-        coarse = (scores.softmax(1) @ heads.values).view(1, 1, h, w)
+        rows = as_rows(pixels)
+        coarse = (heads.probabilities(rows, level_costs(deviations)) @ heads.values).view(1, 1, h, w)
         padded = F.pad(coarse, (1, 1, 1, 1), mode="replicate")[0, 0]
         near = torch.stack([padded[y : y + h, x : x + w] for y in range(3) for x in range(3)])  # (9, h, w)
         weights = torch.addmm(heads.spread[1][:, None], heads.spread[0], rows.T).view(PHASES, 9, h, w).softmax(1)
@@ -179,6 +185,16 @@ def input_shares(logits: Tensor, nearness: Tensor) -> Tensor:
     """Scores (1, 16, h, w) of the inputs, by input, then phase, to weights (4, 4, h, w) whose sum over the inputs is 1."""
     values = planes(logits).view(INPUTS, PHASES, *logits.shape[2:])
     return (values + nearness.view(INPUTS, 1, 1, 1)).softmax(0)
+
+
+def level_costs(deviations: Tensor) -> Tensor:
+    """How far the inputs disagree around each pixel, by the sweep (1, L, h, w): (h w, L)."""
+    return as_rows(mean_around(deviations.to(torch.float32, memory_format=torch.channels_last), AGREEMENT_REACH))
+
+
+def as_rows(values: Tensor) -> Tensor:
+    """(1, C, h, w) as a row of float32 for each pixel: (h w, C)."""
+    return values[0].permute(1, 2, 0).flatten(0, 1).float()
 
 
 def planes(values: Tensor) -> Tensor:

@@ -60,6 +60,8 @@ class CompactSynthesizer:
         self._size = light_field.height, light_field.width
         self._corners = self._networks.prepared(root_tone(padded))
         self._luma = half_luma(padded).unsqueeze(1)
+        with torch.inference_mode():
+            self._networks.expect(self._swept(self._luma, corner_offsets(0.5, 0.5)))
 
     @property
     def weighs(self) -> bool:
@@ -83,14 +85,11 @@ class CompactSynthesizer:
         if self._corners is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        offsets, levels = corner_offsets(u, v), half_resolution(self.config.levels)
-        h, w = (size - REACH for size in self._luma.shape[2:])
-        half = Window(REACH // 2, REACH // 2 + h, REACH // 2, REACH // 2 + w)
+        offsets = corner_offsets(u, v)
         clock = Clock()
         with torch.inference_mode():
             check_cancelled(cancelled)
-            deviations = torch.empty(1, levels.count, h, w, dtype=self.dtype, memory_format=torch.channels_last)
-            deviation_sweep(self._luma, offsets, levels, half, deviations)
+            deviations = self._swept(self._luma, offsets)
             clock.lap("features")
             check_cancelled(cancelled)
             disparity = self._networks.disparity(deviations)  # (4, h, w), phases
@@ -105,6 +104,15 @@ class CompactSynthesizer:
             whole = full_size(disparity)[:height, :width].contiguous().numpy()
             synthesis = LateSynthesis(u, v, self.name, coloured.image.numpy(), whole, None, clock.timings())
         return synthesis, gathered, coloured
+
+    def _swept(self, luma: Tensor, offsets: Tensor) -> Tensor:
+        """What the disparity network takes, (1, L, h, w); offsets: (4, 2), p_i - q."""
+        levels = half_resolution(self.config.levels)
+        h, w = (size - REACH for size in luma.shape[2:])
+        half = Window(REACH // 2, REACH // 2 + h, REACH // 2, REACH // 2 + w)
+        deviations = torch.empty(1, levels.count, h, w, dtype=self.dtype, memory_format=torch.channels_last)
+        deviation_sweep(luma, offsets, levels, half, deviations)
+        return deviations
 
     def _picture_of_warped(self, gathered: Gathered) -> FloatArray:
         """(4, H, W, 3)."""

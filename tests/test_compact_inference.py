@@ -1,14 +1,17 @@
 """The compact networks laid out for speed, compiled and by torch, against lfcore.compact as it is trained."""
 
+import copy
+
 import pytest
 import torch
 
-from lfcore import kernels
+from lfcore import compact_inference, kernels
 from lfcore import winograd as winograds
 from lfcore.compact import CompactConfig, CompactModel, initialise_compact
 from lfcore.compact_inference import CompactInference
 from lfcore.compact_parts import MIDDLE, full_size
 from lfcore.compact_synthesizer import REACH
+from lfcore.expected_disparities import Limits
 from lfcore.layers import Way
 from lfcore.planesweep import Levels, Window, deviation_sweep
 from lfcore.synthesizer import corner_offsets
@@ -65,6 +68,31 @@ def test_the_disparity_is_that_of_the_model(
         torch.testing.assert_close(full_size(found)[None, None], expected, atol=2e-4, rtol=1e-4)
     else:  # hidden values are rounded to a part in 256
         assert float((full_size(found)[None, None] - expected).abs().mean()) < 0.05 * float(expected.std())
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_levels_that_are_not_expected_have_lower_scores(
+    model: CompactModel, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What comes out is what the model finds whose scores are lowered, until other levels are expected."""
+    limits = Limits(-3.0, 1.0)
+    monkeypatch.setattr(compact_inference, "expected", lambda *_: limits)
+    lowered = copy.deepcopy(model)
+    torch.manual_seed(1)
+    luma, offsets, window = torch.rand(4, 1, 40, 44), corner_offsets(0.3, 0.6), Window(13, 27, 13, 31)
+    with torch.inference_mode():
+        assert lowered.disparity.score.bias is not None
+        lowered.disparity.score.bias -= limits.penalties(model.config.levels.values())
+        deviations = deviation_sweep(luma, offsets, Levels(12, -4.5, 4.5), window)
+        inference = CompactInference(model, Tuning(dtype))
+        before = inference.disparity(deviations.to(dtype))
+        inference.expect(deviations.to(dtype))
+        found, known = full_size(inference.disparity(deviations.to(dtype)))[None, None], lowered.disparity(deviations)
+        assert float(found.min()) > -5 and float(found.max()) < 3  # a level beyond is a few thousand times less likely
+        assert float((found - known).abs().mean()) < (1e-4 if dtype == torch.float32 else 0.05 * float(known.std()))
+        monkeypatch.setattr(compact_inference, "expected", lambda *_: None)
+        inference.expect(deviations.to(dtype))
+        assert torch.equal(inference.disparity(deviations.to(dtype)), before)
 
 
 def use_floats_alone(monkeypatch: pytest.MonkeyPatch) -> None:
