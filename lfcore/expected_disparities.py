@@ -14,7 +14,7 @@ from torch import Tensor
 SURE = 1.4  # px, the deviation of the probabilities below which a pixel tells: levels on both sides of a disparity have less
 CLEAR = 0.3  # and where the sweep's least cost is this share of the way below the mean of all from the next one elsewhere,
 ELSEWHERE = 3.0  # px off: a repetitive pattern has a second one, about as low
-OUTERMOST = 0.001  # of the pixels that tell, at either end, do not
+OUTERMOST = 0.0003  # of the pixels that tell, at either end, do not; what is smaller is hardly found in any case
 ENOUGH = 0.01  # of all pixels must tell for limits to be found
 MARGIN = 2.0  # px that are allowed beyond what they say: a disparity in between is a mean of levels on both sides
 STEEPNESS = 8.0  # by which a level's score is lowered for each level that it lies farther out: a few thousand times less likely
