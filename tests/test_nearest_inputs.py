@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from moving_scene import light_field as moving
 from remote_models import Blender, Weigher, make
-from scenes import plane
+from scenes import plane, smooth_texture
 from test_comparing import Program
 
 from app.__main__ import main
@@ -150,7 +150,8 @@ def test_a_plane_is_seen_where_it_is() -> None:
     inside = (slice(24, -24), slice(24, -24))
     assert synthesis.disparity is not None
     assert float(np.median(synthesis.disparity[inside])) == pytest.approx(disparity, abs=1.0)
-    truth = plane(disparity, (101, 101), size).view(65, 40)
+    y, x = np.mgrid[: size[0], : size[1]].astype(np.float32)
+    truth = smooth_texture(x - disparity * np.float32(0.4), y - disparity * np.float32(0.65))
     assert float(np.abs(synthesis.image - truth)[inside].mean()) < 0.01
 
 
