@@ -37,7 +37,7 @@ from app.sway import Sway
 from lfcore.cache import rounded
 from lfcore.errors import LfviewError
 from lfcore.lightfield import LightField
-from lfcore.nearest_inputs import NEIGHBOURS, Cell, cell_around
+from lfcore.nearest_inputs import Cell, cell_around
 from lfcore.sweep_plan import is_plan_file
 
 REST_SECONDS = 0.08  # the hand counts as resting when the viewpoint has not moved for so long
@@ -607,8 +607,8 @@ class Controller:
     def _inputs(self) -> frozenset[tuple[int, int]]:
         if self.light_field is None:
             return frozenset()
-        near = self._model == NEIGHBOURS
-        cell = cell_around(self.light_field, *self.viewpoint) if near else Cell.whole(self.light_field)
+        from_corners = self._engine.scored
+        cell = Cell.whole(self.light_field) if from_corners else cell_around(self.light_field, *self.viewpoint)
         return frozenset(cell.places)
 
     def _busy(self) -> str:

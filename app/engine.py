@@ -35,7 +35,7 @@ _ROOM_LEFT = 0.1  # of the memory cache, for what the hand itself asks for
 @dataclass(frozen=True)
 class ModelChoice:
     """A model that the person may choose. stands_in: whether the quick model serves in its place while the hand moves. scored:
-    whether its pictures are scored against captured views; not where these are its inputs."""
+    whether its pictures are scored against captured views; not where those around the viewpoint are its inputs."""
 
     make: MakeSynthesizer
     stands_in: bool

@@ -29,7 +29,7 @@ def used_channels(stack: PaperStack) -> list[Tensor]:
 
     Of a layer that is not used at all one channel is left.
     """
-    layers, channels = [*stack.convolutions, stack.last], [torch.arange(stack.last.out_channels)]
+    layers, channels = stack.layers, [torch.arange(stack.last.out_channels)]
     for layer in reversed(layers[1:]):
         used = layer.weight[channels[0]].detach().abs().amax((0, 2, 3)).nonzero().flatten()
         channels.insert(0, used if len(used) else torch.zeros(1, dtype=torch.long))
@@ -38,7 +38,7 @@ def used_channels(stack: PaperStack) -> list[Tensor]:
 
 def used_layers(stack: PaperStack) -> UsedLayers:
     """Copies of the layers with their used channels alone."""
-    layers = zip([*stack.convolutions, stack.last], pairwise(used_channels(stack)), strict=True)
+    layers = zip(stack.layers, pairwise(used_channels(stack)), strict=True)
     *hidden, last = [_part(layer, given, taken) for layer, (taken, given) in layers]
     return UsedLayers(hidden, last)
 

@@ -46,6 +46,11 @@ class PaperStack(nn.Module):
         """The hidden layers."""
         return [layer for layer in self.hidden if isinstance(layer, nn.Conv2d)]
 
+    @property
+    def layers(self) -> list[nn.Conv2d]:
+        """All of them."""
+        return [*self.convolutions, self.last]
+
     def forward(self, x: Tensor) -> Tensor:
         hidden = self.hidden(x)
         with torch.autocast(x.device.type, enabled=False):

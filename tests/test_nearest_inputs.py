@@ -309,7 +309,9 @@ def test_the_window_tells_which_views_are_the_inputs(window: Program) -> None:
     controller = window.controller
     assert controller.readout(None).inputs == {(0, 0), (0, 2), (2, 0), (2, 2)}
     choice = ModelChoice(lambda: NearestInputs(Blender("blender")), False, scored=False)
-    named = Controller(Engine(choice.make, 2**20, name=NEIGHBOURS), lambda *_: moving(), lambda: None, NEIGHBOURS)
+    named = Controller(
+        Engine(choice.make, 2**20, name=NEIGHBOURS, scored=choice.scored), lambda *_: moving(), lambda: None, NEIGHBOURS
+    )
     assert not named.readout(None).inputs  # nothing is open
     named.show_light_field(moving())
     named.state.move_to(0.6, 0.3)

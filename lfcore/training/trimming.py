@@ -29,7 +29,7 @@ class Trimmed:
         """A trimmed model, in place, with what has been left out as zeros."""
         for stack, channels in zip(paper_stacks(model), self.channels, strict=True):
             full = PaperStack(len(channels[0]), len(channels[-1]))
-            for layer, of_full, (taken, given) in zip(_layers(stack), _layers(full), pairwise(channels), strict=True):
+            for layer, of_full, (taken, given) in zip(stack.layers, full.layers, pairwise(channels), strict=True):
                 weight, bias = trained_weight(layer), layer.bias
                 assert isinstance(bias, nn.Parameter)
                 whole_weight, whole_bias = weight.new_zeros(of_full.weight.shape), bias.new_zeros(of_full.out_channels)
@@ -43,12 +43,8 @@ def trim(model: Model) -> Trimmed:
     """Leave the idle channels out of every PaperStack of a model, in place; one without any stays as it is."""
     trimmed = Trimmed(tuple(tuple(used_channels(stack)) for stack in paper_stacks(model)))
     for stack, channels in zip(paper_stacks(model), trimmed.channels, strict=True):
-        for layer, (taken, given) in zip(_layers(stack), pairwise(channels), strict=True):
+        for layer, (taken, given) in zip(stack.layers, pairwise(channels), strict=True):
             assert layer.bias is not None
             layer.weight = nn.Parameter(layer.weight[given][:, taken])
             layer.bias = nn.Parameter(layer.bias[given])
     return trimmed
-
-
-def _layers(stack: PaperStack) -> list[nn.Conv2d]:
-    return [*stack.convolutions, stack.last]
