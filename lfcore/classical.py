@@ -19,6 +19,7 @@ from torch import Tensor
 from lfcore.errors import InputError
 from lfcore.lightfield import EXTRAPOLATION_LIMIT, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Shifted, Window, luminance, shifted_inputs
+from lfcore.span import disparity_reach
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.warp import backward_warp
 
@@ -53,7 +54,7 @@ class PlaneSweepSynthesizer:
     """The classical way; its Synthesis has disparity, warped inputs and timings like that of the networks."""
 
     name = "planesweep"
-    key = "planesweep 1"
+    key = "planesweep 2"
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         self._tuning = tuning or Tuning()
@@ -73,8 +74,16 @@ class PlaneSweepSynthesizer:
         with torch.inference_mode():
             self._brightest = brightest_tone(self._corners)
             self._toned = _toned(self._corners, self._brightest)
-            low, high = disparity_range(self._toned, self._tuning)
-        self._levels = Levels(math.ceil((high - low) / self._tuning.step) + 1, low, high)
+            self._levels = self._found_levels(self._corners, self._toned)
+
+    def _found_levels(self, corners: Tensor, toned: Tensor) -> Levels:
+        """As many as the widest sweep has at most, where disparities reach farther than that farther apart."""
+        reach = disparity_reach(corners)
+        if reach is not None and max(-reach.low, reach.high) > _WIDEST.high + reach.step:
+            low, high = reach.low - reach.step, reach.high + reach.step
+        else:
+            low, high = disparity_range(toned, self._tuning)
+        return Levels(min(math.ceil((high - low) / self._tuning.step) + 1, _WIDEST.count), low, high)
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._corners is None or self._toned is None:

@@ -18,6 +18,7 @@ from lfcore.compact_parts import (
     PHASES,
     Gathered,
     Heads,
+    Places,
     as_rows,
     gathered_order,
     input_shares,
@@ -109,11 +110,10 @@ class CompactInference:
         fine = self._skip(deviations, plus=risen, positive=True)
         return self._join(fine, plus=fine, positive=True)
 
-    def warp(self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]) -> Gathered:
-        """`prepared` corners, continued by `reach` px, warped by the phases of a disparity. offsets: (4, 2), p_i - q;
-        position: (u, v)."""
+    def warp(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
+        """`prepared` corners warped by the phases of a disparity, px as this network counts them. position: (u, v)."""
         u, v = position
-        return self._parts.gathered(corners, disparity, offsets, reach, (2 * u - 1, 2 * v - 1))
+        return self._parts.gathered(corners, disparity, places, (2 * u - 1, 2 * v - 1))
 
     def colour(self, gathered: Gathered, position: tuple[float, float], size: tuple[int, int]) -> Coloured:
         """The picture, (height, width) = `size`, of the warped inputs at (u, v)."""

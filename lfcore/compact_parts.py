@@ -49,6 +49,15 @@ class Heads:
 
 
 @dataclass(frozen=True)
+class Places:
+    """Where the inputs are sampled: at x + move + offset * disparity, x counted from a place `reach` px within them."""
+
+    offsets: Tensor  # (4, 2)
+    moves: Tensor  # (4, 2), px
+    reach: int
+
+
+@dataclass(frozen=True)
 class Gathered:
     """The warped inputs."""
 
@@ -60,15 +69,13 @@ class Parts(Protocol):
     """One way to compute them."""
 
     def prepared(self, corners: Tensor) -> Tensor:
-        """Corner views (4, 3, H, W) in the root tone less MIDDLE, continued by `reach`, as `gathered` takes them."""
+        """Corner views (4, 3, H, W) in the root tone less MIDDLE, continued beyond their edges, as `gathered` takes them."""
 
     def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
         """Hidden channels (1, C, h, w), not negative, and the sweep's deviations (1, L, h, w) to phases (4, h, w), px."""
 
-    def gathered(
-        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
-    ) -> Gathered:
-        """The corners warped by the phases of the disparity; offsets: (4, 2), p_i - q; position: as the network takes it."""
+    def gathered(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
+        """The corners warped by the phases of the disparity; position: as the network takes it."""
 
     def blended(self, outputs: Tensor, straight: Tensor, warped: Tensor, nearness: Tensor, size: tuple[int, int]) -> Tensor:
         """The picture (*size, 3), stored values within 0 and 1. outputs: (1, 28, h, w), LOGITS scores of the inputs by input,
@@ -95,6 +102,11 @@ def full_size(phases: Tensor) -> Tensor:
     return result
 
 
+def phases_of(picture: Tensor) -> Tensor:
+    """(2 h, 2 w) -> (4, h, w): what `full_size` puts together."""
+    return torch.stack([picture[phase // 2 :: 2, phase % 2 :: 2] for phase in range(PHASES)])
+
+
 class CompiledParts:
     """See Parts: by lfcore.kernels."""
 
@@ -113,10 +125,9 @@ class CompiledParts:
     def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
         return kernels.compact_disparity(pixels, deviations, self._score, self._values, self._spread, self._sharpness)
 
-    def gathered(
-        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
-    ) -> Gathered:
-        return Gathered(*kernels.compact_warp(corners, disparity, offsets, reach, QUICK_A, position, self._dtype))
+    def gathered(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
+        ways = places.offsets, places.moves
+        return Gathered(*kernels.compact_warp(corners, disparity, *ways, places.reach, QUICK_A, position, self._dtype))
 
     def blended(self, outputs: Tensor, straight: Tensor, warped: Tensor, nearness: Tensor, size: tuple[int, int]) -> Tensor:
         return kernels.compact_blend(outputs, straight, warped, nearness, size, (MIDDLE, RESIDUAL, TOE))
@@ -152,12 +163,10 @@ class TorchParts:
         weights = torch.addmm(heads.spread[1][:, None], heads.spread[0], rows.T).view(PHASES, 9, h, w).softmax(1)
         return weights.mul_(near).sum(1)
 
-    def gathered(
-        self, corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, position: tuple[float, float]
-    ) -> Gathered:
+    def gathered(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
         """`warped` is (4, 3, 4, h, w), by input, channel and phase."""
         _, h, w = disparity.shape
-        warped = _warped_phases(corners, disparity, offsets, reach)
+        warped = _warped_phases(corners, disparity, places)
         mean = warped.mean(0)  # (3, 4, h, w)
         channels = torch.empty(1, GATHERED, h, w, dtype=self._dtype)
         colours = channels[0, :60].view(PHASES, 1 + INPUTS, 3, h, w)
@@ -202,15 +211,16 @@ def planes(values: Tensor) -> Tensor:
     return values.contiguous().float()
 
 
-def _warped_phases(corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int) -> Tensor:
-    """The inputs (4, 3, ., .), continued by `reach`, warped by the phases (4, h, w) of a disparity: (4, 3, 4, h, w)."""
+def _warped_phases(corners: Tensor, disparity: Tensor, places: Places) -> Tensor:
+    """The inputs (4, 3, ., .) warped by the phases (4, h, w) of a disparity: (4, 3, 4, h, w)."""
     _, h, w = disparity.shape
     phase = torch.arange(PHASES).view(PHASES, 1, 1)
-    rows = (2 * torch.arange(h).view(1, h, 1) + phase // 2 + reach).float()  # (4, h, 1)
-    columns = (2 * torch.arange(w).view(1, 1, w) + phase % 2 + reach).float()
-    du, dv = offsets.view(INPUTS, 2, 1, 1, 1).unbind(1)
-    x = torch.addcmul(columns, du, disparity).view(INPUTS, PHASES * h, w)
-    y = torch.addcmul(rows, dv, disparity).view(INPUTS, PHASES * h, w)
+    rows = (2 * torch.arange(h).view(1, h, 1) + phase // 2 + places.reach).float()  # (4, h, 1)
+    columns = (2 * torch.arange(w).view(1, 1, w) + phase % 2 + places.reach).float()
+    du, dv = places.offsets.view(INPUTS, 2, 1, 1, 1).unbind(1)
+    move_x, move_y = places.moves.view(INPUTS, 2, 1, 1, 1).unbind(1)
+    x = torch.addcmul(columns + move_x, du, disparity).view(INPUTS, PHASES * h, w)
+    y = torch.addcmul(rows + move_y, dv, disparity).view(INPUTS, PHASES * h, w)
     return quick_sample(corners, x, y).view(INPUTS, 3, PHASES, h, w)
 
 

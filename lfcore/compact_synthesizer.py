@@ -12,17 +12,19 @@ from torch import Tensor
 from lfcore.allocator import keep_freed_memory
 from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.compact_inference import Coloured, CompactInference
-from lfcore.compact_parts import Gathered, full_size
+from lfcore.compact_parts import Gathered, Places, full_size, phases_of
 from lfcore.errors import InputError
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Window, deviation_sweep, luminance
+from lfcore.span import Span, continued_by_others, made_larger, made_smaller, span_of
 from lfcore.synthesis import LateSynthesis
-from lfcore.synthesizer import Clock, Synthesis, check_cancelled, continued, corner_offsets, corner_tensor, never, picture
+from lfcore.synthesizer import Clock, Synthesis, check_cancelled, corner_offsets, corner_tensor, never, picture
 from lfcore.tone import root_tone, stored_from_root
 from lfcore.tuned_stack import Tuning
 from lfcore.tuning import machine_tuning
 
-# How far the inputs are continued beyond their edges, px: 21 px of disparity at a viewpoint 0.25 outside, and the taps.
+# How far the inputs are continued beyond their edges, px: 21 px of disparity at a viewpoint 0.25 outside, and the taps. A span
+# asks for more.
 REACH = 32
 
 
@@ -51,17 +53,33 @@ class CompactSynthesizer:
         self.dtype = tuning.dtype
         self._networks = CompactInference(model, tuning)
         self._size = 0, 0
+        self._span = Span()
         self._corners: Tensor | None = None  # prepared for the warp
-        self._luma: Tensor | None = None  # (4, 1, H' / 2 + REACH, W' / 2 + REACH), as the sweep wants it
+        self._luma: Tensor | None = None  # (4, 1, h + edge, w + edge): swept; smaller where the span says so
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
-        padded = continued(corner_tensor(light_field), REACH, ALIGNMENT)
+        corners = corner_tensor(light_field)
         self._size = light_field.height, light_field.width
+        self._span = span = span_of(corners, self.config.levels)
+        padded = continued_by_others(corners, self._edge, span.shift, ALIGNMENT)
         self._corners = self._networks.prepared(root_tone(padded))
+        if span.scale > 1:
+            small = made_smaller(corners, span.scale)
+            padded = continued_by_others(small, self._swept_edge, span.in_small, ALIGNMENT)
         self._luma = half_luma(padded).unsqueeze(1)
         with torch.inference_mode():
             self._networks.expect(self._swept(self._luma, corner_offsets(0.5, 0.5)))
+
+    @property
+    def _edge(self) -> int:
+        """By how many px the inputs of the warp are continued."""
+        return REACH + self._span.margin(self.config.levels)
+
+    @property
+    def _swept_edge(self) -> int:
+        """By how many those of the sweep are, px of pictures as small as the span says."""
+        return REACH + self._span.small_margin()
 
     @property
     def weighs(self) -> bool:
@@ -92,27 +110,36 @@ class CompactSynthesizer:
             deviations = self._swept(self._luma, offsets)
             clock.lap("features")
             check_cancelled(cancelled)
-            disparity = self._networks.disparity(deviations)  # (4, h, w), phases
+            disparity = self._as_large(self._networks.disparity(deviations))  # (4, h, w), phases, px of the network
             clock.lap("disparity")
             check_cancelled(cancelled)
-            gathered = self._networks.warp(self._corners, disparity, offsets, REACH, (u, v))
+            places = Places(self._span.scale * offsets, self._span.shift * offsets, self._edge)
+            gathered = self._networks.warp(self._corners, disparity, places, (u, v))
             clock.lap("warp")
             check_cancelled(cancelled)
             coloured = self._networks.colour(gathered, (u, v), self._size)
             clock.lap("colour")
             height, width = self._size
-            whole = full_size(disparity)[:height, :width].contiguous().numpy()
+            whole = self._span.disparity(full_size(disparity)[:height, :width].contiguous()).numpy()
             synthesis = LateSynthesis(u, v, self.name, coloured.image.numpy(), whole, None, clock.timings())
         return synthesis, gathered, coloured
 
     def _swept(self, luma: Tensor, offsets: Tensor) -> Tensor:
         """What the disparity network takes, (1, L, h, w); offsets: (4, 2), p_i - q."""
-        levels = half_resolution(self.config.levels)
-        h, w = (size - REACH for size in luma.shape[2:])
-        half = Window(REACH // 2, REACH // 2 + h, REACH // 2, REACH // 2 + w)
+        levels, edge = half_resolution(self.config.levels.moved(self._span.in_small)), self._swept_edge
+        h, w = (size - edge for size in luma.shape[2:])
+        half = Window(edge // 2, edge // 2 + h, edge // 2, edge // 2 + w)
         deviations = torch.empty(1, levels.count, h, w, dtype=self.dtype, memory_format=torch.channels_last)
         deviation_sweep(luma, offsets, levels, half, deviations)
         return deviations
+
+    def _as_large(self, phases: Tensor) -> Tensor:
+        """The phases of a map made smaller, as the span says, as those of one of the picture's size."""
+        if self._span.scale == 1:
+            return phases
+        height, width = (-(-size // ALIGNMENT) * ALIGNMENT for size in self._size)
+        whole = made_larger(full_size(phases)[None, None], self._span.scale)
+        return phases_of(whole[0, 0, :height, :width])
 
     def _picture_of_warped(self, gathered: Gathered) -> FloatArray:
         """(4, H, W, 3)."""

@@ -41,14 +41,14 @@ def expected(probabilities: Tensor, costs: Tensor, values: Tensor) -> Limits | N
     """
     mean = probabilities @ values
     deviation = (probabilities @ values.square() - mean.square()).clamp(min=0).sqrt()
-    telling = mean[(deviation < SURE) & (_clarity(costs, values) > CLEAR)].sort().values
+    telling = mean[(deviation < SURE) & (clarity(costs, values) > CLEAR)].sort().values
     if len(telling) < ENOUGH * len(mean):
         return None
     outermost = int(OUTERMOST * len(telling))
     return Limits(float(telling[outermost]) - MARGIN, float(telling[-1 - outermost]) + MARGIN)
 
 
-def _clarity(costs: Tensor, values: Tensor) -> Tensor:
+def clarity(costs: Tensor, values: Tensor) -> Tensor:
     """How far the least cost lies below the next one elsewhere, as a share of how far it lies below the mean: (N,)."""
     least, at = costs.min(1)
     near = (values - values[at].unsqueeze(1)).abs() <= ELSEWHERE  # (N, L)

@@ -13,13 +13,13 @@ from lfcore.errors import InputError
 from lfcore.fewer_means import kept_levels, with_fewer_means
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.networks import BORDER, FullModel, colour_features, sweep_luminance
-from lfcore.planesweep import sparse_sweep
+from lfcore.planesweep import Window, sparse_sweep
+from lfcore.span import Span, continued_by_others, made_larger, made_smaller, span_of
 from lfcore.synthesis import LateSynthesis
 from lfcore.synthesizer import (
     Clock,
     Synthesis,
     check_cancelled,
-    continued,
     corner_offsets,
     corner_tensor,
     never,
@@ -31,7 +31,7 @@ from lfcore.tuning import machine_tuning
 from lfcore.warp import backward_warp
 
 # How far the inputs are continued beyond their edges, px: 21 px of disparity and more at a viewpoint 0.25 outside, from the
-# borders of both networks.
+# borders of both networks. A span asks for more.
 REACH = 64
 
 
@@ -52,9 +52,10 @@ class NetworkSynthesizer:
         stack = with_fewer_means(model.disparity, self.config.levels, self._means)
         self._disparity = TunedStack(stack, self._tuning)
         self._colour = TunedStack(model.colour, self._tuning)
+        self._span = Span()
         self._corners: Tensor | None = None  # (4, 3, H, W)
-        self._continued: Tensor | None = None  # (4, 3, H + 2 REACH, W + 2 REACH)
-        self._luma: Tensor | None = None  # (4, 1, the same), what is swept
+        self._continued: Tensor | None = None  # (4, 3, H + 2 edge, W + 2 edge)
+        self._luma: Tensor | None = None  # (4, 1, h + 2 edge, w + 2 edge), what is swept; made smaller where the span says so
         keep_freed_memory()
 
     @property
@@ -64,34 +65,38 @@ class NetworkSynthesizer:
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer."""
-        self._corners = corner_tensor(light_field)
-        self._continued = continued(self._corners, REACH)
-        self._luma = sweep_luminance(self._continued, self.config).unsqueeze(1)
+        self._corners = corners = corner_tensor(light_field)
+        self._span = span = span_of(corners, self.config.levels)
+        self._continued = swept = continued_by_others(corners, self._edge, span.shift)
+        if span.scale > 1:
+            swept = continued_by_others(made_smaller(corners, span.scale), self._swept_edge, span.in_small)
+        self._luma = sweep_luminance(swept, self.config).unsqueeze(1)
+
+    @property
+    def _edge(self) -> int:
+        """By how many px the inputs of the warp are continued."""
+        return REACH + self._span.margin(self.config.levels)
+
+    @property
+    def _swept_edge(self) -> int:
+        """By how many those of the sweep are, px of pictures as small as the span says."""
+        return REACH + self._span.small_margin()
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._corners is None or self._continued is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        corners, luma, levels = self._corners, self._luma, self.config.levels
+        corners, span = self._corners, self._span
         height, width = corners.shape[2:]
-        wide = height + 2 * BORDER, width + 2 * BORDER  # what the colour network sees
         offsets = corner_offsets(u, v)
-        channels = len(self._means) + levels.count
         clock, check = Clock(), partial(check_cancelled, cancelled)
-        disparity = torch.empty(1, 1, *wide)
         image = torch.empty(1, 3, height, width)
         with torch.inference_mode():
-            for tile in self._tuning.tiles(*wide):
-                check()
-                source = tile.source.moved(REACH - 2 * BORDER)
-                features = self._disparity.empty_input(*source.shape)
-                sparse_sweep(luma, offsets, levels, self._means, source, features[:, :channels])
-                clock.lap("features")
-                put(disparity, tile.window, self._disparity(features, check))
-                clock.lap("disparity")
+            found = self._found(self._luma, offsets, clock, check)  # (1, 1, *wide), px of the network
             check()
-            warped = backward_warp(self._continued, disparity, offsets, (REACH - BORDER, REACH - BORDER))  # (4, 3, *wide)
-            h = colour_features(disparity, warped.view(1, 12, *wide), torch.tensor([[u, v]]))  # (1, 15, *wide)
+            wide, disparity, inside = found.shape[2:], span.disparity(found), self._edge - BORDER
+            warped = backward_warp(self._continued, disparity, offsets, (inside, inside))  # (4, 3, *wide)
+            h = colour_features(found, warped.view(1, 12, *wide), torch.tensor([[u, v]]))  # (1, 15, *wide)
             clock.lap("warp")
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._colour(self._colour.tile_input(h, tile), check))
@@ -100,6 +105,32 @@ class NetworkSynthesizer:
         seen = picture(image[0].clamp_(0, 1))
         synthesis = LateSynthesis(u, v, self.name, seen, own[0, 0].numpy(), None, clock.timings())
         return synthesis.with_warped(lambda: _warped(corners, own, offsets))
+
+    def _found(self, luma: Tensor, offsets: Tensor, clock: Clock, check: Callable[[], None]) -> Tensor:
+        """What the disparity network finds, (1, 1, H + 2 BORDER, W + 2 BORDER): as far as the colour network sees."""
+        levels, edge = self.config.levels.moved(self._span.in_small), self._swept_edge
+        small = Window(0, luma.shape[2] - 2 * (edge - BORDER), 0, luma.shape[3] - 2 * (edge - BORDER))
+        channels = len(self._means) + levels.count
+        found = torch.empty(1, 1, *small.shape)
+        for tile in self._tuning.tiles(*small.shape):
+            check()
+            source = tile.source.moved(edge - 2 * BORDER)
+            features = self._disparity.empty_input(*source.shape)
+            sparse_sweep(luma, offsets, levels, self._means, source, features[:, :channels])
+            clock.lap("features")
+            put(found, tile.window, self._disparity(features, check))
+            clock.lap("disparity")
+        return self._as_large(found)
+
+    def _as_large(self, found: Tensor) -> Tensor:
+        """A map made smaller, as the span says, as one of the picture's size; both with BORDER px around."""
+        scale = self._span.scale
+        if scale == 1 or self._corners is None:
+            return found
+        height, width = self._corners.shape[2:]
+        beyond = (scale - 1) * BORDER
+        large = made_larger(found, scale)
+        return large[:, :, beyond : beyond + height + 2 * BORDER, beyond : beyond + width + 2 * BORDER].contiguous()
 
 
 def _warped(corners: Tensor, disparity: Tensor, offsets: Tensor) -> FloatArray:

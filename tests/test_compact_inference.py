@@ -9,7 +9,7 @@ from lfcore import compact_inference, kernels
 from lfcore import winograd as winograds
 from lfcore.compact import CompactConfig, CompactModel, initialise_compact
 from lfcore.compact_inference import CompactInference
-from lfcore.compact_parts import MIDDLE, full_size
+from lfcore.compact_parts import MIDDLE, Places, full_size
 from lfcore.compact_synthesizer import REACH
 from lfcore.expected_disparities import Limits
 from lfcore.layers import Way
@@ -115,10 +115,12 @@ def test_picture_weights_and_warped_inputs_are_those_of_the_model(
     disparity, offsets = 3 * torch.randn(1, 1, *SIZE), corner_offsets(0.2, 0.9)
     size = height - cut[0], width - cut[1]
     with torch.inference_mode():
-        warped = quick_warp(padded, disparity.expand(4, -1, -1, -1), offsets, (REACH, REACH))
+        # The network counts disparities in steps of 2 px, from 1 px on.
+        warped = quick_warp(padded, (2 * disparity + 1).expand(4, -1, -1, -1), offsets, (REACH, REACH))
         expected = model.colour(warped.view(1, 12, *SIZE), disparity, torch.tensor([[0.2, 0.9]]))[0]
         networks = CompactInference(model, Tuning(dtype))
-        gathered = networks.warp(networks.prepared(padded), phases(disparity[0, 0]), offsets, REACH, (0.2, 0.9))
+        places = Places(2 * offsets, offsets, REACH)
+        gathered = networks.warp(networks.prepared(padded), phases(disparity[0, 0]), places, (0.2, 0.9))
         coloured = networks.colour(gathered, (0.2, 0.9), size)
         blended = full_size(coloured.shares()).unsqueeze(1).mul(warped - MIDDLE).sum(0)
     assert float(expected.std()) > 0.05
@@ -146,11 +148,12 @@ def test_what_the_colour_network_takes_is_the_same_in_bfloat16(
     torch.manual_seed(3)
     padded = torch.rand(4, 3, SIZE[0] + 2 * REACH, SIZE[1] + 2 * REACH)
     disparity, offsets = 4 * torch.randn(4, SIZE[0] // 2, SIZE[1] // 2), corner_offsets(0.8, 0.1)
+    places = Places(offsets, torch.zeros(4, 2), REACH)
     found = {}
     with torch.inference_mode():
         for dtype in (torch.float32, torch.bfloat16):
             networks = CompactInference(model, Tuning(dtype))
-            found[dtype] = networks.warp(networks.prepared(padded), disparity, offsets, REACH, (0.8, 0.1)).channels
+            found[dtype] = networks.warp(networks.prepared(padded), disparity, places, (0.8, 0.1)).channels
     assert found[torch.bfloat16].is_contiguous(memory_format=torch.channels_last)
     if not kernels.compiled() or kernels.warp_type(torch.bfloat16) == torch.float32:
         assert torch.equal(found[torch.float32].bfloat16(), found[torch.bfloat16])
@@ -167,7 +170,8 @@ def test_disparities_that_are_far_away_take_the_edge(model: CompactModel, dtype:
     disparity[:, 4] = float("nan")  # of which nothing is asked but that the program lives on
     with torch.inference_mode():
         networks = CompactInference(model, Tuning(dtype))
-        gathered = networks.warp(networks.prepared(padded), disparity, corner_offsets(1, 1), REACH, (1.0, 1.0))
+        places = Places(corner_offsets(1, 1), torch.zeros(4, 2), REACH)
+        gathered = networks.warp(networks.prepared(padded), disparity, places, (1.0, 1.0))
         first = networks.warped_pictures(gathered)[0]
     exact = {} if dtype == torch.float32 else {"atol": 1e-3, "rtol": 0.0}
     # The first input's offsets are -1 and -1: far to the right and below in the first rows, left and above in the last.

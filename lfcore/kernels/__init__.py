@@ -335,21 +335,29 @@ def warp_type(dtype: torch.dtype) -> torch.dtype:
 
 
 def compact_warp(
-    corners: Tensor, disparity: Tensor, offsets: Tensor, reach: int, a: float, position: tuple[float, float], dtype: torch.dtype
+    corners: Tensor,
+    disparity: Tensor,
+    offsets: Tensor,
+    moves: Tensor,
+    reach: int,
+    a: float,
+    position: tuple[float, float],
+    dtype: torch.dtype,
 ) -> tuple[Tensor, Tensor]:
     """The inputs warped by the phases of a disparity, and with it what lfcore.compact.CompactColour begins with.
 
     corners: (4, H, W, 4) of `warp_type(dtype)`, three channels and one that does not count, continued by `reach` px beyond the
-    edges, at least two. disparity: (4, h, w) float32, px. offsets: (4, 2) float32, p_i - q. a: of the cubic kernel. position:
-    as the network takes it. Returns (1, 64, h, w) in channels_last order and of `dtype`, by phase: means and the differences
-    from them of the four inputs, three channels each; then the position, the mean disparity and how far it spreads; and the
-    warped inputs, (h, w, 4, 4, 4) by phase, input and channel, the fourth of which does not count, of the corners' type.
+    edges, at least two. disparity: (4, h, w) float32. offsets, moves: (4, 2) float32; inputs are sampled at x + move + offset *
+    disparity. a: of the cubic kernel. position: as the network takes it. Returns (1, 64, h, w) in channels_last order and of
+    `dtype`, by phase: means and the differences from them of the four inputs, three channels each; then the position, the mean
+    disparity and how far it spreads; and the warped inputs, (h, w, 4, 4, 4) by phase, input and channel, the fourth of which
+    does not count, of the corners' type.
     """
     assert _KERNELS is not None
     _, height, width = disparity.shape
     assert corners.shape[0] == corners.shape[3] == 4 and min(corners.shape[1:3]) >= 4 and reach >= 2
-    assert disparity.shape[0] == 4 and offsets.shape == (4, 2) and corners.numel() < 2**31
-    along_axes = offsets.T.contiguous()
+    assert disparity.shape[0] == 4 and offsets.shape == moves.shape == (4, 2) and corners.numel() < 2**31
+    along_axes = torch.stack((offsets.T, moves.T))  # (2, 2, 4)
     _check((), (disparity, along_axes))
     assert corners.is_contiguous() and corners.dtype == warp_type(dtype)
     gathered = torch.empty(1, 64, height, width, dtype=dtype, memory_format=torch.channels_last)

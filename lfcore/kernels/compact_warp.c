@@ -46,6 +46,7 @@ PART Four sample_colours(const Warp *warp, int input, const Places *across, cons
 PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict widest) {
     const Py_ssize_t w = warp->width;
     const Four offsets_x = four_at(warp->offsets), offsets_y = four_at(warp->offsets + INPUTS);
+    const Four moves_x = four_at(warp->moves), moves_y = four_at(warp->moves + INPUTS);
     spreads_of_row(warp, y, widest);
     for (Py_ssize_t x = 0; x < w; ++x) {
         float *restrict warped = (float *)warp->warped + (y * w + x) * PHASES * INPUTS * 4;
@@ -56,8 +57,8 @@ PART void warp_row(const Warp *warp, Py_ssize_t y, float *restrict widest) {
             const float column = (float)(2 * x + phase % 2 + warp->reach), row = (float)(2 * y + phase / 2 + warp->reach);
             Four samples[INPUTS], mean = {0.0f};
             total += disparity;
-            const Places across = inner_places(column + offsets_x * disparity, warp->source_width, warp->a);
-            const Places down = inner_places(row + offsets_y * disparity, warp->source_height, warp->a);
+            const Places across = inner_places(column + moves_x + offsets_x * disparity, warp->source_width, warp->a);
+            const Places down = inner_places(row + moves_y + offsets_y * disparity, warp->source_height, warp->a);
             for (int n = 0; n < INPUTS; ++n) {
                 samples[n] = sample_colours(warp, n, &across, &down);
                 mean += samples[n];
@@ -109,7 +110,8 @@ PyObject *compact_warp(PyObject *Py_UNUSED(module), PyObject *arguments) {
         return NULL;
     warp.corners = at_address(corners);
     warp.disparity = at_address(disparity);
-    warp.offsets = at_address(offsets);
+    warp.offsets = at_address(offsets); /* the moves lie behind them */
+    warp.moves = warp.offsets + 2 * INPUTS;
     warp.gathered = at_address(gathered);
     warp.warped = at_address(warped);
     int failed;

@@ -9,7 +9,8 @@ typedef struct {
     const void *corners; /* (INPUTS, source_height, source_width, 4): three channels and one unused */
     Py_ssize_t source_height, source_width;
     const float *disparity; /* (PHASES, height, width), px */
-    const float *offsets; /* (2, INPUTS): what a pixel of disparity moves the place of sampling by, along x, then y */
+    const float *offsets; /* (2, INPUTS): what disparity moves the place of sampling by, along x, then y */
+    const float *moves; /* (2, INPUTS): by what it is moved anyhow, px */
     Py_ssize_t height, width, reach; /* reach: of the whole picture's first pixel from the corners' edges, px */
     float a; /* of the cubic kernel */
     float u, v; /* as the colour network takes them */

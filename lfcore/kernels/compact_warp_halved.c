@@ -75,8 +75,10 @@ __attribute__((HALVED)) static void warp_row(const Warp *warp, Py_ssize_t y, flo
     const __m512i by_phase = lanes(1, 0), by_input = lanes(0, 1), one = _mm512_set1_epi32(1);
     const __m512 offsets_x = _mm512_broadcast_f32x4(_mm_loadu_ps(warp->offsets));
     const __m512 offsets_y = _mm512_broadcast_f32x4(_mm_loadu_ps(warp->offsets + INPUTS));
-    const __m512 columns = _mm512_cvtepi32_ps(_mm512_and_si512(by_phase, one));
-    const __m512 rows = _mm512_cvtepi32_ps(_mm512_srli_epi32(by_phase, 1)) + (float)(2 * y + warp->reach);
+    const __m512 moves_x = _mm512_broadcast_f32x4(_mm_loadu_ps(warp->moves));
+    const __m512 moves_y = _mm512_broadcast_f32x4(_mm_loadu_ps(warp->moves + INPUTS));
+    const __m512 columns = _mm512_cvtepi32_ps(_mm512_and_si512(by_phase, one)) + moves_x;
+    const __m512 rows = _mm512_cvtepi32_ps(_mm512_srli_epi32(by_phase, 1)) + moves_y + (float)(2 * y + warp->reach);
     const __m512i width = _mm512_set1_epi32((int32_t)warp->source_width);
     const __m512i inputs = _mm512_mullo_epi32(by_input, _mm512_set1_epi32((int32_t)(warp->source_height * warp->source_width)));
     spreads_of_row(warp, y, widest);
