@@ -24,7 +24,7 @@ from lfcore.tone import root_tone
 
 _SMALLER = 4  # times: of the pictures in which disparities are looked for
 _LONG_SIDE = 512  # px that these have at most, so that a large picture takes no longer
-_WIDEST = 32  # px, of these, and a quarter of their longer side at most
+_WIDEST = 32  # px, of these, and three eighths of their shorter side at most
 _AROUND = 5  # px a side, over which deviations are averaged
 _STRIDE = 2  # px from one place that is asked to the next
 _CLEAR = 0.5  # lfcore.expected_disparities.clarity from which on a place tells
@@ -85,11 +85,11 @@ def span_of(corners: Tensor, levels: Levels) -> Span:
 
 def disparity_reach(corners: Tensor) -> Reach | None:
     """How far the disparities of four corner views (4, 3, H, W) reach, by a sweep at a fraction of their size; None where too
-    little tells. What lies farther than a quarter of the longer side is not found."""
+    little tells. What lies farther than three eighths of the shorter side is not found."""
     smaller = _SMALLER * math.ceil(max(corners.shape[2:]) / (_SMALLER * _LONG_SIDE))
     if min(corners.shape[2:]) < smaller * _AROUND:
         return None
-    widest = min(_WIDEST, max(corners.shape[2:]) // (4 * smaller))
+    widest = min(_WIDEST, 3 * min(corners.shape[2:]) // (8 * smaller))
     levels = Levels(2 * widest + 1, -widest, widest)
     with torch.inference_mode():
         costs = _costs(made_smaller(corners, smaller), levels).flatten(2)[0].T  # (N, L)
@@ -112,8 +112,9 @@ def _costs(corners: Tensor, levels: Levels) -> Tensor:
 
 
 def continued_by_others(corners: Tensor, by: int, shift: float, alignment: int = 1) -> Tensor:
-    """The four corner views (4, C, H, W) continued by at least `shift` px, as lfcore.synthesizer.continued does, but first by
-    one another: where all disparities are about `shift`, what lies beyond the edge of one is in the next, moved by so much.
+    """The four corner views (4, C, H, W) continued by `by` px, as lfcore.synthesizer.continued does, but first by one another:
+    where all disparities are about `shift`, what lies beyond the edge of one is in the next, moved by so much. |shift| is less
+    than by, H and W.
 
     Else the networks would see edges repeated for half of the shift, where they know a few px of that.
     """

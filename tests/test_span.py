@@ -56,7 +56,7 @@ def halves(left: float, right: float, grid: tuple[int, int] = (2, 2)) -> LightFi
 
 @pytest.mark.parametrize("disparity", [-56.0, -30.0, 0.0, 9.0, 47.0])
 def test_the_reach_of_a_plane_is_its_disparity(disparity: float) -> None:
-    reach = disparity_reach(corner_tensor(plane(disparity, (2, 2), SIZE)))
+    reach = disparity_reach(corner_tensor(plane(disparity, (2, 2), SIZE, clouds)))
     assert reach is not None
     assert abs(reach.low - disparity) <= reach.step and abs(reach.high - disparity) <= reach.step
     assert reach.low <= reach.mean <= reach.high
@@ -67,6 +67,18 @@ def test_noise_a_flat_picture_and_a_small_one_tell_nothing() -> None:
     assert disparity_reach(noise) is None
     assert disparity_reach(torch.full((4, 3, *SIZE), 0.4)) is None
     assert disparity_reach(torch.rand(4, 3, 9, 200)) is None
+
+
+def test_a_strip_does_not_go_farther_than_it_is_high() -> None:
+    """Else its views would not meet where they continue one another."""
+    strip = corner_tensor(plane(70.0, (2, 2), (64, 480), clouds))
+    span = span_of(strip, Levels())
+    assert abs(span.shift) < 64
+    assert bool(continued_by_others(strip, 90, span.shift).isfinite().all())
+
+
+def test_where_nothing_is_told_nothing_is_changed() -> None:
+    noise = torch.rand(4, 3, *SIZE, generator=torch.Generator().manual_seed(1))
     for told_nothing in (noise, torch.zeros(4, 3, 2, 2)):
         assert span_of(told_nothing, Levels()) == Span()
 
