@@ -54,6 +54,7 @@ class CompactSynthesizer:
         self._networks = CompactInference(model, tuning)
         self._size = 0, 0
         self._span = Span()
+        self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
         self._corners: Tensor | None = None  # prepared for the warp
         self._luma: Tensor | None = None  # (4, 1, h + edge, w + edge): swept; smaller where the span says so
         keep_freed_memory()
@@ -62,6 +63,7 @@ class CompactSynthesizer:
         corners = corner_tensor(light_field)
         self._size = light_field.height, light_field.width
         self._span = span = span_of(corners, self.config.levels)
+        self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
         padded = continued_by_others(corners, self._edge, span.shift, ALIGNMENT)
         self._corners = self._networks.prepared(root_tone(padded))
         if span.scale > 1:
@@ -70,16 +72,6 @@ class CompactSynthesizer:
         self._luma = half_luma(padded).unsqueeze(1)
         with torch.inference_mode():
             self._networks.expect(self._swept(self._luma, corner_offsets(0.5, 0.5)))
-
-    @property
-    def _edge(self) -> int:
-        """By how many px the inputs of the warp are continued."""
-        return REACH + self._span.margin(self.config.levels)
-
-    @property
-    def _swept_edge(self) -> int:
-        """By how many those of the sweep are, px of pictures as small as the span says."""
-        return REACH + self._span.small_margin()
 
     @property
     def weighs(self) -> bool:

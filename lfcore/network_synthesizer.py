@@ -53,6 +53,7 @@ class NetworkSynthesizer:
         self._disparity = TunedStack(stack, self._tuning)
         self._colour = TunedStack(model.colour, self._tuning)
         self._span = Span()
+        self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
         self._corners: Tensor | None = None  # (4, 3, H, W)
         self._continued: Tensor | None = None  # (4, 3, H + 2 edge, W + 2 edge)
         self._luma: Tensor | None = None  # (4, 1, h + 2 edge, w + 2 edge), what is swept; made smaller where the span says so
@@ -67,20 +68,11 @@ class NetworkSynthesizer:
         """See Synthesizer."""
         self._corners = corners = corner_tensor(light_field)
         self._span = span = span_of(corners, self.config.levels)
+        self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
         self._continued = swept = continued_by_others(corners, self._edge, span.shift)
         if span.scale > 1:
             swept = continued_by_others(made_smaller(corners, span.scale), self._swept_edge, span.in_small)
         self._luma = sweep_luminance(swept, self.config).unsqueeze(1)
-
-    @property
-    def _edge(self) -> int:
-        """By how many px the inputs of the warp are continued."""
-        return REACH + self._span.margin(self.config.levels)
-
-    @property
-    def _swept_edge(self) -> int:
-        """By how many those of the sweep are, px of pictures as small as the span says."""
-        return REACH + self._span.small_margin()
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._corners is None or self._continued is None or self._luma is None:

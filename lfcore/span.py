@@ -34,7 +34,7 @@ _ENOUGH = 0.01  # of all places must
 
 @dataclass(frozen=True)
 class Reach:
-    """Least and greatest disparity, px over the full baseline, as far as a coarse look tells."""
+    """Disparities, px over the full baseline, as far as a coarse look tells."""
 
     low: float
     mean: float
@@ -58,13 +58,12 @@ class Span:
         """px over the full baseline, of a network's px."""
         return found if self == Span() else self.scale * found + self.shift
 
-    def margin(self, levels: Levels) -> int:
-        """By how many px more than without a span pictures must be continued beyond their edges; even."""
-        return _even((1 + EXTRAPOLATION_LIMIT) * (abs(self.shift) + (self.scale - 1) * levels.reach))
-
-    def small_margin(self) -> int:
-        """The same of pictures made smaller."""
-        return _even((1 + EXTRAPOLATION_LIMIT) * abs(self.in_small))
+    def edges(self, reach: int, levels: Levels) -> tuple[int, int]:
+        """By how many px pictures, and those made smaller, must be continued beyond their edges, where without a span it is
+        `reach`; even, if that is."""
+        own = abs(self.shift) + (self.scale - 1) * levels.reach
+        of_small = abs(self.in_small)
+        return reach + _even((1 + EXTRAPOLATION_LIMIT) * own), reach + _even((1 + EXTRAPOLATION_LIMIT) * of_small)
 
 
 def span_of(corners: Tensor, levels: Levels) -> Span:
