@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 
 from app.tone import Curve, Tone
 from lfcore.colormaps import ColourMap
+from lfcore.key_frames import MAX_FOCUS
 
-# Of the plane sweep, px over the baseline: those of the paper's disparity network.
-LEVEL_LIMITS = (-21.0, 21.0)
-LEVEL_STEP = (LEVEL_LIMITS[1] - LEVEL_LIMITS[0]) / 99
+# Of the plane sweep, px over the baseline: those of the paper's disparity network, and as far beyond as a light field reaches.
+LEVELS = (-21.0, 21.0)
+LEVEL_STEP = (LEVELS[1] - LEVELS[0]) / 99
 
 # Red, green and blue (1 = full) by which the inputs, in the order of CORNERS, are told apart,
 # by colour-blind eyes too (Okabe and Ito 2008).
@@ -20,7 +21,7 @@ CORNER_COLOURS = ((0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45), (0.8
 LEAN_REACH = 1
 LEAN_TOLERANCE = 0.04
 
-RANGE_LIMITS = (-99.0, 99.0)  # disparities, px over the baseline
+RANGE_LIMITS = (-MAX_FOCUS, MAX_FOCUS)  # disparities, px over the baseline
 LEAST_RANGE = 0.1
 
 
@@ -37,7 +38,7 @@ class Looking:
     def bounded(self) -> Looking:
         """With everything held within its limits."""
         chosen = self.with_range(*self.hand_range) if self.hand_range is not None else self
-        return replace(chosen, tone=self.tone.bounded(), level=_between(self.level, LEVEL_LIMITS))
+        return replace(chosen, tone=self.tone.bounded(), level=_between(self.level, RANGE_LIMITS))
 
     def with_range(self, low: float, high: float) -> Looking:
         """With colours from and to these disparities, LEAST_RANGE apart at the least."""
@@ -52,9 +53,9 @@ class Looking:
         middle, half = (low + high) / 2, factor * (high - low) / 2
         return self.with_range(middle - half, middle + half)
 
-    def at_next_level(self, step: int) -> Looking:
-        """At the level so many steps further; levels are those of the disparity network, or lie between them."""
-        return replace(self, level=_between(self.level + step * LEVEL_STEP, LEVEL_LIMITS))
+    def at_next_level(self, step: int, limits: tuple[float, float]) -> Looking:
+        """At the level so many steps further; levels are those of the disparity network, or lie between or beyond them."""
+        return replace(self, level=_between(self.level + step * LEVEL_STEP, limits))
 
     def next_colour_map(self) -> Looking:
         """With the colour map after this one, going round."""
@@ -65,6 +66,12 @@ class Looking:
         """In the authors' tone, or as stored where it was in that."""
         curve = Curve.STORED if self.tone.curve is Curve.AUTHORS else Curve.AUTHORS
         return replace(self, tone=replace(self.tone, curve=curve))
+
+
+def level_limits(disparities: tuple[float, float] | None) -> tuple[float, float]:
+    """From which to which level the plane sweep is looked at, where these disparities are shown."""
+    low, high = disparities or LEVELS
+    return min(low, LEVELS[0]), max(high, LEVELS[1])
 
 
 def _between(value: float, limits: tuple[float, float]) -> float:

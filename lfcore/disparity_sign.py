@@ -21,12 +21,8 @@ import numpy.typing as npt
 
 from lfcore.lightfield import FloatArray, LightField, as_float
 
-# Pictures are averaged down to at most this many pixels on the longer side.
-_LONG_SIDE = 320
-
-# Disparities tried reach to this share of the longer side, in steps of half a pixel of the averaged picture.
-_REACH = 1 / 16
-_STEP = 0.5
+_STEP = 0.5  # px of the averaged picture from one disparity that is tried to the next
+_NEAR_LIMIT = 0.75  # share of the nearer look's reach beyond which the farther one is taken as well
 
 # Side of the square blocks that are matched, and radius of the local mean taken off (views differ in brightness).
 _BLOCK = 8
@@ -68,8 +64,8 @@ _SENTENCES = {
         "pictures; swap the two numbers in the names and number the rows (or the columns) the other way round."
     ),
     Order.UNKNOWN: (
-        "Whether rows and columns run the right way cannot be told from the pictures: too little texture or too little "
-        "movement between the corner views."
+        "Whether rows and columns run the right way cannot be told from the pictures: too little texture, or too little "
+        "or too much movement between the corner views."
     ),
 }
 
@@ -80,6 +76,26 @@ _ARRANGEMENTS = {
     Order.EXCHANGED: (True, False),
     Order.TURNED: (True, True),
 }
+
+
+@dataclass(frozen=True)
+class _Look:
+    """`long_side`: px that pictures are averaged down to at most. `reach`: how far disparities are tried, of the longer side,
+    and of the shorter one at most."""
+
+    long_side: int
+    reach: float
+    of_shorter: float
+
+    def tried(self, height: int, width: int) -> float:
+        """The largest disparity, px of averaged pictures of this size."""
+        limit = min(max(height, width) * self.reach, min(height, width) * self.of_shorter)
+        return _STEP * math.floor(limit / _STEP)
+
+
+# What cameras with microlenses have, and what gantries and arrays of cameras may have.
+_NEARER = _Look(320, 1 / 16, 1.0)
+_FARTHER = _Look(192, 3 / 8, 3 / 8)
 
 
 @dataclass(frozen=True)
@@ -112,24 +128,38 @@ class DisparityCheck:
 
 
 def check_disparity(light_field: LightField) -> DisparityCheck:
-    """Find out from four corner views in which arrangement they match, and at which disparities. Takes about 0.3 s.
+    """Find out from four corner views in which arrangement they match, and at which disparities. Takes about 0.3 s, where
+    they lie far apart half as long again.
 
-    The corners are those of the largest square in the middle of the grid whose corner views are not dark.
+    The corners are those of the largest square in the middle of the grid whose corner views are not dark. Disparities are
+    found up to three eighths of the views' shorter side.
     """
-    corners, scale = _square_corners(light_field)  # (4, h, w), full-baseline px per px here
+    near, share = _look(light_field, _NEARER)
+    if near.order is not Order.UNKNOWN and share < _NEAR_LIMIT:
+        return near
+    far, _ = _look(light_field, _FARTHER)
+    return near if far.order is Order.UNKNOWN else far
+
+
+def _look(light_field: LightField, look: _Look) -> tuple[DisparityCheck, float]:
+    """What it tells, and how much of its reach the disparities take; 0 where none are found."""
+    corners, scale = _square_corners(light_field, look.long_side)  # (4, h, w), full-baseline px per px here
     if corners is None:
-        return _unknown()
-    return _judge(corners, scale)
+        return _unknown(), 0.0
+    reach = look.tried(*corners.shape[1:])
+    check = _judge(corners, scale, reach)
+    taken = 0.0 if check.order is Order.UNKNOWN else max(abs(check.low), abs(check.high)) / (scale * reach)
+    return check, taken
 
 
-def _square_corners(light_field: LightField) -> tuple[FloatArray | None, float]:
+def _square_corners(light_field: LightField, long_side: int) -> tuple[FloatArray | None, float]:
     """The four corner pictures in the order (top, left), (top, right), (bottom, left), (bottom, right), made comparable."""
     rows, columns = light_field.rows, light_field.columns
     for side in range(min(rows, columns), 1, -1):
         top, left = (rows - side) // 2, (columns - side) // 2
         places = list(itertools.product((top, top + side - 1), (left, left + side - 1)))
         if not light_field.dark.intersection(places):
-            shrink = math.ceil(max(light_field.height, light_field.width) / _LONG_SIDE)
+            shrink = math.ceil(max(light_field.height, light_field.width) / long_side)
             pictures = np.stack([_comparable(light_field.views[place], shrink) for place in places])
             return pictures, shrink * (columns - 1) / (side - 1)
     return None, 1.0
@@ -155,9 +185,8 @@ def _local_mean(picture: FloatArray) -> FloatArray:
     return (window / side**2).astype(np.float32)
 
 
-def _judge(corners: FloatArray, scale: float) -> DisparityCheck:
+def _judge(corners: FloatArray, scale: float, reach: float) -> DisparityCheck:
     height, width = corners.shape[1:]
-    reach = _STEP * math.floor(max(height, width) * _REACH / _STEP)
     disparities = np.arange(-reach, reach + _STEP / 2, _STEP, dtype=np.float32)
     margin = math.ceil(reach / 2) + 1
     if min(height, width) - 2 * margin < _BLOCK or reach < 1:

@@ -83,6 +83,25 @@ def test_all_disparities_of_one_sign_are_judged_too() -> None:
     assert check_disparity(wrap(views[:, ::-1])).order is Order.REVERSED
 
 
+@pytest.mark.parametrize("change", CHANGES)
+def test_planes_as_far_apart_as_those_of_a_gantry_are_judged_and_measured(change: str) -> None:
+    rearrange, expected = CHANGES[change]
+    check = check_disparity(wrap(rearrange(two_planes(near=-60.0, far=-80.0, size=(300, 400)))))
+    assert check.order is expected
+    if expected is Order.AGREES:
+        # The farther look averages over 3 px here.
+        assert check.low == pytest.approx(-80.0, abs=3.0)
+        assert check.high == pytest.approx(-60.0, abs=3.0)
+    else:
+        assert check.high - check.low == pytest.approx(20.0, abs=3.0)
+
+
+def test_a_look_that_finds_disparities_up_to_its_end_is_followed_by_a_farther_one() -> None:
+    check = check_disparity(wrap(two_planes(near=30.0, far=10.0)))  # the nearer one ends at 12.5 px
+    assert check.order is Order.AGREES
+    assert (check.low, check.high) == (pytest.approx(10.0, abs=1.0), pytest.approx(30.0, abs=1.0))
+
+
 def test_disparity_is_measured_over_the_full_baseline_when_dark_corners_are_passed_over() -> None:
     views = two_planes(near=8.0, far=-4.0, rows=5, columns=5).copy()
     views[[0, 0, -1, -1], [0, -1, 0, -1]] //= 20

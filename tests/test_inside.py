@@ -11,7 +11,7 @@ import torch
 from canvas_maps import map_of
 
 from app.canvas import Canvas, Frame
-from app.looking import CORNER_COLOURS, LEVEL_LIMITS, LEVEL_STEP
+from app.looking import CORNER_COLOURS, LEVEL_STEP, LEVELS
 from app.painting import in_bytes
 from app.state import Look
 from lfcore import colormaps
@@ -81,7 +81,7 @@ def test_the_sweep_is_what_the_disparity_network_sees(canvas: Canvas, corners: F
 
 def test_the_levels_are_those_of_the_network() -> None:
     levels = Levels().values()
-    assert (float(levels[0]), float(levels[-1])) == LEVEL_LIMITS
+    assert (float(levels[0]), float(levels[-1])) == LEVELS
     assert float(levels[1] - levels[0]) == pytest.approx(LEVEL_STEP, rel=1e-4)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.looking import LEAST_RANGE, LEVEL_LIMITS, LEVEL_STEP, RANGE_LIMITS, Looking
+from app.looking import LEAST_RANGE, LEVEL_STEP, LEVELS, RANGE_LIMITS, Looking, level_limits
 from app.snapshot import put_back, take
 from app.state import GAIN_LIMITS, Look, ViewState
 from app.tone import STOPS_LIMITS, STOPS_STEP, Curve, Tone
@@ -130,11 +130,20 @@ def test_ranges_and_levels_stay_within_limits() -> None:
     low, high = Looking().with_range(2.0, 2.0).hand_range or (0.0, 0.0)
     assert high - low == pytest.approx(LEAST_RANGE)
     wild = Looking(Tone(stops=1e9), hand_range=(-1e9, 1e9), level=-1e9).bounded()
-    assert wild == Looking(Tone(stops=STOPS_LIMITS[1]), hand_range=RANGE_LIMITS, level=LEVEL_LIMITS[0])
+    assert wild == Looking(Tone(stops=STOPS_LIMITS[1]), hand_range=RANGE_LIMITS, level=RANGE_LIMITS[0])
     looking = Looking()
     for _ in range(200):
-        looking = looking.at_next_level(1)
-    assert looking.level == LEVEL_LIMITS[1]
+        looking = looking.at_next_level(1, LEVELS)
+    assert looking.level == LEVELS[1]
+
+
+def test_levels_reach_as_far_as_the_disparities_that_are_shown(screen: Screen) -> None:
+    assert level_limits(None) == level_limits((-2.0, 3.0)) == LEVELS
+    assert level_limits((-60.0, -50.0)) == (-60.0, LEVELS[1])
+    screen.readout = replace(screen.readout, disparity_range=(-22.0, 40.0))
+    for _ in range(round(41 / LEVEL_STEP)):
+        screen.press("PgUp")
+    assert screen.state.looking.level == 40.0
 
 
 def test_all_of_it_is_kept_and_undone() -> None:

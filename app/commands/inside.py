@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.commands.kinds import INSIDE, Command, Context, Run
 from app.commands.looking import look_at
+from app.looking import level_limits
 from app.state import Look
 
 
@@ -12,7 +13,7 @@ def _level(step: int) -> Run:
 
     def run(context: Context) -> None:
         state = context.state
-        state.looking = state.looking.at_next_level(step)
+        state.looking = state.looking.at_next_level(step, level_limits(context.disparity_range))
         if not state.look.is_sweep:
             state.look = Look.SWEEP_MEAN
 

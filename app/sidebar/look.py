@@ -8,7 +8,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app import theme
 from app.commands import Context
-from app.looking import LEVEL_LIMITS, RANGE_LIMITS
+from app.looking import RANGE_LIMITS, level_limits
 from app.readout import Readout
 from app.state import GAIN_LIMITS, TAIL_LIMITS, Look
 from app.tone import CURVE_MEANING, GAMMA_LIMITS, STOPS_LIMITS, Curve
@@ -151,6 +151,6 @@ def _level(context: Context) -> None:
     state = context.state
     before = state.looking.level
     hint = "Disparity by which the inputs are warped, px over the baseline; small is near.  (PgUp and PgDn)"
-    level = slider("Level", before, LEVEL_LIMITS, f"{number(before, 2)}", hint)
+    level = slider("Level", before, level_limits(context.disparity_range), f"{number(before, 2)}", hint)
     if level != before:
         state.looking = replace(state.looking, level=level)

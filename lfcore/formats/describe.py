@@ -8,7 +8,7 @@ from lfcore.disparity_sign import DisparityCheck, Order, check_disparity
 from lfcore.formats.images import depth_name
 from lfcore.lightfield import LightField
 
-# Disparities beyond this, in px over the full baseline, lie outside the plane sweep of the paper's networks.
+# Disparities beyond this, in px over the full baseline, lie outside the levels of the paper's networks (see lfcore.span).
 _SWEEP_LIMIT = 21.0
 
 # Pictures whose median is darker than this share of white were most likely stored without gamma.
@@ -63,7 +63,7 @@ def _disparity(light_field: LightField, check: DisparityCheck) -> str:
     if steps > 1:
         text += f" ({check.low / steps:.2f} to {check.high / steps:.2f} px between neighbouring views)"
     if max(abs(check.low), abs(check.high)) > _SWEEP_LIMIT:
-        text += f"; the networks cover {_SWEEP_LIMIT:.0f} px either way, so expect ghosts beyond"
+        text += f"; beyond the {_SWEEP_LIMIT:.0f} px either way that the networks know, so they are set to it"
     return text
 
 
