@@ -35,13 +35,15 @@ def add_verb(verbs: Verbs[Any], name: str, summary: str, example: str) -> argpar
 
 def add_light_field(parser: argparse.ArgumentParser) -> None:
     """PATH and --views, for the verbs that open one light field."""
-    parser.add_argument("path", metavar="PATH", type=Path, help="a raw capture, an ESLF picture or a folder of views")
+    parser.add_argument(
+        "path", metavar="PATH", type=Path, help="a raw capture, an ESLF picture, a folder or an array (.mat, .h5) of views"
+    )
     parser.add_argument(
         "--views",
         type=int,
         default=8,
         metavar="N",
-        help="side of the middle square of views taken from a raw capture or an ESLF (default: 8)",
+        help="side of the middle square of views taken from a raw capture, an ESLF or an array with dark corners (default: 8)",
     )
 
 

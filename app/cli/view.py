@@ -17,8 +17,8 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         metavar="PATH",
         type=Path,
         nargs="?",
-        help="a raw capture, an ESLF picture, a folder of views or of light fields (default: the start picture with the "
-        "files opened lately, the sample where there are none)",
+        help="a raw capture, an ESLF picture, an array (.mat, .h5), a folder of views or of light fields (default: the start "
+        "picture with the files opened lately, the sample where there are none)",
     )
     add_model(parser)
     parser.set_defaults(model=None)  # that of the last run, at first `full`

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lfcore.errors import InputError
-from lfcore.formats import eslf, views_folder
+from lfcore.formats import array_files, arrays, eslf, views_folder
 from lfcore.formats.describe import describe
 from lfcore.formats.images import check_memory, read_header
 from lfcore.formats.lytro.container import is_container, open_container
@@ -22,7 +22,10 @@ __all__ = ["coarse_light_field", "describe", "open_light_field"]
 
 _VIEWS = 8  # side of the middle square of views, as in the paper
 
-_KINDS = "a raw capture (.lfp, .LFR), an ESLF picture (14 x 14 px per microlens) or a folder with one picture per view"
+_KINDS = (
+    "a raw capture (.lfp, .LFR), an ESLF picture (14 x 14 px per microlens), a folder with one picture per view or an array of "
+    "views (.mat, .h5)"
+)
 
 
 def open_light_field(
@@ -32,11 +35,12 @@ def open_light_field(
     progress: Callable[[float], None] | None = None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> LightField:
-    """Open a light field of any kind that is understood: an ESLF picture, a folder of views, one view of a folder, or a raw
-    capture of a Lytro camera.
+    """Open a light field of any kind that is understood: an ESLF picture, a folder of views, one view of a folder, an array
+    of views in a file of MATLAB or HDF5, or a raw capture of a Lytro camera.
 
-    `views` is the side of the middle square of views taken from an ESLF or a raw capture (2 to 14; 8 as in the paper, 14 for
-    all). Raw captures are decoded with the calibration at hand and kept in this user's cache.
+    `views` is the side of the middle square of views taken from an ESLF, a raw capture, or an array whose corner views are
+    dark (2 to 14; 8 as in the paper, 14 for all). Raw captures are decoded with the calibration at hand and kept in this
+    user's cache.
     `progress` is called in the calling thread with rising values up to 1; `cancelled` is asked often. Values keep their
     stored depth. Raises InputError (one sentence) for whatever cannot be opened, Cancelled where `cancelled` says so.
     """
@@ -46,6 +50,8 @@ def open_light_field(
         return views_folder.read(path, progress, cancelled)
     if is_container(path):
         return _open_lytro(path, views, progress, cancelled)
+    if array_files.sniff(path):
+        return arrays.read(path, views, progress, cancelled)
     header = read_header(path)
     check_memory(path, header)
     if eslf.has_camera_size(header):

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lfcore.errors import InputError
-from lfcore.formats import eslf
+from lfcore.formats import array_files, eslf
 from lfcore.formats.images import EXTENSIONS, read_header
 from lfcore.formats.names import belongs_to_grid, find_grid
 
 MEMBERS_LIMIT = 5000
-CONTAINERS = (".lfp", ".lfr", ".lfx")
+CONTAINERS = (".lfp", ".lfr", ".lfx", *array_files.EXTENSIONS)  # files of one light field each
 _LEVELS = 3
 
 
@@ -31,7 +31,8 @@ def folder_around(path: Path) -> Path:
 
 def members(folder: Path) -> tuple[Path, ...]:
     """What in this folder may be a light field, in the order of their names: sub-folders with pictures or light fields in
-    them, files of Lytro cameras, pictures. Empty where the folder is no folder, is a light field itself, or holds none.
+    them, files of Lytro cameras, MATLAB and HDF5, pictures. Empty where the folder is no folder, is a light field itself, or
+    holds none.
 
     Contents are not looked at, so that a folder of thousands is listed at once. Raises InputError where it cannot be read.
     """
@@ -55,7 +56,7 @@ def members(folder: Path) -> tuple[Path, ...]:
 
 
 def holds_something(folder: Path) -> bool:
-    """Whether there are pictures or files of Lytro cameras in the folder or in one of those in it."""
+    """Whether there are pictures or files of Lytro cameras, MATLAB or HDF5 in the folder or in one of those in it."""
     endings = (*EXTENSIONS, *CONTAINERS)
     return _holds(folder, endings) or any(_holds(inner, endings) for inner in _folders(folder))
 

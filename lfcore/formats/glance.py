@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lfcore.errors import InputError
-from lfcore.formats import eslf, views_folder
+from lfcore.formats import array_files, arrays, eslf, views_folder
 from lfcore.formats.collection import members
 from lfcore.formats.images import check_memory, open_picture, read_header
 from lfcore.formats.lytro.container import is_container, open_container
@@ -44,6 +44,9 @@ def glance(path: Path, cancelled: Callable[[], bool] = lambda: False) -> Glance:
         return _middle_of_grid(path)
     if is_container(path):
         return _of_container(path)
+    if array_files.sniff(path):
+        view, caption = arrays.middle_view(path)
+        return Glance(shrunk(_in_colour(view)), caption)
     header = read_header(path)
     check_memory(path, header)
     if not eslf.has_camera_size(header) and views_folder.sniff(path):
@@ -74,7 +77,12 @@ def _middle_of_grid(path: Path) -> Glance:
         check_memory(file, header, grid.rows * grid.columns)
         pixels = picture.read()  # (H, W, 1 or 3)
     caption = f"{grid.columns} × {grid.rows} views of {header.width} × {header.height} px"
-    return Glance(shrunk(np.broadcast_to(pixels, (*pixels.shape[:2], 3))), caption)
+    return Glance(shrunk(_in_colour(pixels)), caption)
+
+
+def _in_colour(pixels: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    """(H, W, 1 or 3) -> (H, W, 3)."""
+    return np.broadcast_to(pixels, (*pixels.shape[:2], 3))
 
 
 def _of_container(path: Path) -> Glance:

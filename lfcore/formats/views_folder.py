@@ -6,13 +6,12 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from lfcore.disparity_sign import Order, check_disparity
 from lfcore.errors import Cancelled, InputError
+from lfcore.formats.checks import put_in_order, warned_of_order, without_non_finite
 from lfcore.formats.dark import find_dark_views
 from lfcore.formats.images import EXTENSIONS, Header, Pixels, check_memory, open_picture, read_header
 from lfcore.formats.names import GANTRY, RULES, Grid, belongs_to_grid, find_grid
@@ -67,7 +66,8 @@ def read(
         warnings=tuple(warnings),
         dark=find_dark_views(views),
     )
-    return _checked_against_pictures(light_field)
+    # A gantry's columns are in the order of the camera's x, so where one axis is reversed it must be the rows.
+    return put_in_order(light_field) if grid.kind == GANTRY else warned_of_order(light_field)
 
 
 def grid_of(path: Path) -> Grid:
@@ -124,7 +124,7 @@ def _read_all(
             _check_alike(file, picture.header, first, header)
             target = views[index]  # (H, W, 3)
             target[...] = picture.read()  # grey is repeated
-        count = _replace_non_finite(target)
+        count = without_non_finite(target)
         if count:
             bad_values[file.name] = count
 
@@ -148,29 +148,6 @@ def _read_all(
     return bad_values
 
 
-def _checked_against_pictures(light_field: LightField) -> LightField:
-    """Warn where rows and columns run against the pictures; put the rows of a gantry folder right.
-
-    The gantry's columns are already in the order of the camera's x, so where one axis is reversed it must be the rows.
-    """
-    check = check_disparity(light_field)
-    if check.order is Order.REVERSED and light_field.kind == GANTRY:
-        _reverse_rows(light_field.views)
-        facts = {**light_field.facts, "Row order": "reversed against the names, as the pictures show"}
-        return replace(light_field, facts=facts, dark=find_dark_views(light_field.views))
-    if check.is_wrong:
-        return replace(light_field, warnings=(*light_field.warnings, check.sentence))
-    return light_field
-
-
-def _reverse_rows(views: Pixels) -> None:
-    """In place and row by row, since the views of a gantry may fill much of the memory."""
-    for row in range(len(views) // 2):
-        upper = views[row].copy()
-        views[row] = views[-1 - row]
-        views[-1 - row] = upper
-
-
 def _check_alike(file: Path, header: Header, first: Path, expected: Header) -> None:
     if (header.width, header.height) != (expected.width, expected.height):
         raise InputError(f"{file} is {header.size} px, but {first.name} is {expected.size} px; all views must have one size.")
@@ -178,14 +155,3 @@ def _check_alike(file: Path, header: Header, first: Path, expected: Header) -> N
         raise InputError(
             f"{file} stores {header.depth}, but {first.name} stores {expected.depth}; all views must have one depth."
         )
-
-
-def _replace_non_finite(view: Pixels) -> int:
-    """Set nan and inf of a float view to 0 in place; return how many there were."""
-    if view.dtype.kind != "f":
-        return 0
-    bad = ~np.isfinite(view)
-    count = int(np.count_nonzero(bad))
-    if count:
-        view[bad] = 0
-    return count

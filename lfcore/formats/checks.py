@@ -1,0 +1,53 @@
+"""What is looked at, and put right, in light fields of several kinds after they are read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lfcore.disparity_sign import DisparityCheck, Order, check_disparity
+from lfcore.formats.dark import find_dark_views
+from lfcore.formats.images import Pixels
+from lfcore.lightfield import LightField
+
+
+def without_non_finite(view: Pixels) -> int:
+    """Set nan and inf of a float view to 0 in place; return how many there were."""
+    if view.dtype.kind != "f":
+        return 0
+    bad = ~np.isfinite(view)
+    count = int(np.count_nonzero(bad))
+    if count:
+        view[bad] = 0
+    return count
+
+
+def warned_of_order(light_field: LightField) -> LightField:
+    """With a warning where rows and columns run against the pictures."""
+    return _warned(light_field, check_disparity(light_field))
+
+
+def put_in_order(light_field: LightField) -> LightField:
+    """With its rows reversed, in place, where one axis runs against the pictures; else as warned_of_order.
+
+    For kinds of which either axis may run the other way; which of them does cannot be told from the pictures.
+    """
+    check = check_disparity(light_field)
+    if check.order is not Order.REVERSED:
+        return _warned(light_field, check)
+    _reverse_rows(light_field.views)
+    facts = {**light_field.facts, "Row order": "reversed, as the pictures show"}
+    return replace(light_field, facts=facts, dark=find_dark_views(light_field.views))
+
+
+def _warned(light_field: LightField, check: DisparityCheck) -> LightField:
+    return replace(light_field, warnings=(*light_field.warnings, check.sentence)) if check.is_wrong else light_field
+
+
+def _reverse_rows(views: Pixels) -> None:
+    """In place and row by row, since the views of a gantry may fill much of the memory."""
+    for row in range(len(views) // 2):
+        upper = views[row].copy()
+        views[row] = views[-1 - row]
+        views[-1 - row] = upper
