@@ -26,6 +26,8 @@ _SMALLER = 4  # times: of the pictures in which disparities are looked for
 _LONG_SIDE = 512  # px that these have at most, so that a large picture takes no longer
 _WIDEST = 32  # px, of these, and three eighths of their shorter side at most
 _AROUND = 5  # px a side, over which deviations are averaged
+_LOCAL = 6  # px either way, of the mean that brightness is compared with
+_DARK = 0.1  # of a view's mean is added to that, so that noise in the dark does not count
 _STRIDE = 2  # px from one place that is asked to the next
 _CLEAR = 0.5  # lfcore.expected_disparities.clarity from which on a place tells
 _OUTERMOST = (0.5, 99.5)  # percentiles of those that tell
@@ -103,11 +105,19 @@ def disparity_reach(corners: Tensor) -> Reach | None:
 def _costs(corners: Tensor, levels: Levels) -> Tensor:
     """How far they disagree at each level around places of the middle view: (1, L, h, w)."""
     edge = math.ceil(levels.reach / 2) + 3  # half of the baseline, and the taps
-    luma = root_tone(luminance(continued(corners, edge))).unsqueeze(1)
+    luma = _detail(root_tone(luminance(continued(corners, edge))).unsqueeze(1))
     height, width = corners.shape[2:]
     deviations = torch.empty(1, levels.count, height, width, memory_format=torch.channels_last)
     deviation_sweep(luma, corner_offsets(0.5, 0.5), levels, Window(edge, edge + height, edge, edge + width), deviations)
     return F.avg_pool2d(deviations, _AROUND, _STRIDE)
+
+
+def _detail(luma: Tensor) -> Tensor:
+    """(4, 1, h, w) -> the same over the mean around each pixel, less 1: one view may be darker than another, or darker to one
+    side, and would else match best wherever that does not show."""
+    side = 2 * _LOCAL + 1
+    around = F.avg_pool2d(F.pad(luma, (_LOCAL,) * 4, mode="replicate"), side, 1)
+    return luma / (around + _DARK * luma.mean((1, 2, 3), keepdim=True)).clamp(min=1e-6) - 1
 
 
 def continued_by_others(corners: Tensor, by: int, shift: float, alignment: int = 1) -> Tensor:

@@ -62,6 +62,26 @@ def test_the_reach_of_a_plane_is_its_disparity(disparity: float) -> None:
     assert reach.low <= reach.mean <= reach.high
 
 
+def darkened(corners: torch.Tensor, gains: tuple[float, ...]) -> torch.Tensor:
+    """The corner views by these factors, and each to half of that towards its own corner, as lenses do it."""
+    y = torch.linspace(0, 1, corners.shape[2]).view(-1, 1)
+    x = torch.linspace(0, 1, corners.shape[3])
+    outwards = [(1 - abs(u - x)) * (1 - abs(v - y)) for u, v in CORNERS]
+    return corners * torch.stack([gain * (1 - part / 2) for gain, part in zip(gains, outwards, strict=True)]).unsqueeze(1)
+
+
+UNEVEN = (0.8, 1, 1, 1), (1, 1, 0.6, 1), (0.9, 0.7, 0.8, 0.6)
+
+
+@pytest.mark.parametrize("gains", UNEVEN)
+def test_views_of_uneven_brightness_have_the_same_reach(gains: tuple[float, ...]) -> None:
+    for scene in (plane(47.0, (2, 2), SIZE, clouds), halves(-18.0, 20.0)):
+        corners = corner_tensor(scene)
+        even, uneven = disparity_reach(corners), disparity_reach(darkened(corners, gains))
+        assert even is not None and uneven is not None
+        assert abs(even.low - uneven.low) <= even.step and abs(even.high - uneven.high) <= even.step
+
+
 def test_noise_a_flat_picture_and_a_small_one_tell_nothing() -> None:
     noise = torch.rand(4, 3, *SIZE, generator=torch.Generator().manual_seed(1))
     assert disparity_reach(noise) is None
@@ -105,7 +125,10 @@ def test_the_span_brings_all_disparities_within_the_levels(
 @pytest.mark.skipif(not SCENES, reason="the shared test data is not beside the repository")
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.name)
 def test_real_light_fields_within_the_levels_are_left_alone(path: Path) -> None:
-    assert span_of(corner_tensor(open_light_field(path)), Levels()) == Span()
+    corners = corner_tensor(open_light_field(path))
+    assert span_of(corners, Levels()) == Span()
+    for gains in UNEVEN:
+        assert span_of(darkened(corners, gains), Levels()) == Span()
 
 
 def test_the_sample_is_left_alone() -> None:
