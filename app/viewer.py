@@ -6,7 +6,7 @@ import ctypes
 import math
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -43,13 +43,12 @@ SMALLEST_SIZE = (200, 150)
 MEBIBYTE = 2**20
 
 _SETTLE_FRAMES = 3  # imgui shows the effect of an event up to two frames later
-# imgui takes a press and what follows it in different frames, so that a burst of presses needs as many frames to be taken.
-_FRAMES_PER_PRESS = 2
-_MOST_FRAMES = 60
 _WOKEN_FRAMES = 2
 _HOVER_SECONDS = 0.8  # after the last movement of the mouse, a tooltip may still appear
 _HOVER_INTERVAL = 0.1
 _CARET_INTERVAL = 0.25  # of a blinking caret
+_MODIFIERS = (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT)
+_NO_KEY = imgui.Key.f24  # no keyboard has it, and nothing is done by it
 _LEAST_STEP = 1e-5  # seconds from one frame to the next, since imgui takes none of 0
 _IDLE_INTERVAL = 0.5  # how long Ctrl-C may have to wait, since Python's signals wait for glfw to return
 
@@ -194,16 +193,16 @@ class _Window:
         self._shared: SharedWindow | None = None
         self._woken = threading.Event()  # by a worker, or by another size of the window, since the last look
         self._touched_at = 0.0  # last event of mouse or keyboard
-        self._presses = 0  # of keys and buttons, and turns of the wheel, since the last look
+        self._let_go = False  # whether a modifier has come up, and no key has gone down since
         self._title = TITLE
         self._unmaximised = place or WindowPlace(0, 0, *WINDOW_SIZE)
         imgui.create_context()
         imgui.get_io().set_ini_filename("")
         # Set before imgui sets its own callbacks, which call these.
         glfw.set_cursor_pos_callback(self._window, self._touched)
-        glfw.set_mouse_button_callback(self._window, self._pressed)
-        glfw.set_scroll_callback(self._window, self._pressed)
-        glfw.set_key_callback(self._window, self._pressed)
+        glfw.set_mouse_button_callback(self._window, self._touched)
+        glfw.set_scroll_callback(self._window, self._touched)
+        glfw.set_key_callback(self._window, self._key)
         for follow in (
             glfw.set_framebuffer_size_callback,
             glfw.set_window_size_callback,
@@ -263,6 +262,8 @@ class _Window:
                 frames_due -= 1
                 self._drawn_at = time.monotonic()
                 self.draw()
+                if len(self._not_taken):
+                    frames_due = _SETTLE_FRAMES
             wait = self._wait_seconds(frames_due > 0)
             before = time.monotonic()
             if wait > 0:
@@ -274,8 +275,7 @@ class _Window:
             if woken:  # not otherwise: what comes just now must be seen the next time
                 self._woken.clear()
             if self._touched_at >= before:
-                frames_due = min(max(frames_due + _FRAMES_PER_PRESS * self._presses, _SETTLE_FRAMES), _MOST_FRAMES)
-                self._presses = 0
+                frames_due = max(frames_due, _SETTLE_FRAMES)
             elif woken:
                 frames_due = max(frames_due, _WOKEN_FRAMES)
             elif wait < _IDLE_INTERVAL:
@@ -322,6 +322,12 @@ class _Window:
         io.delta_time = max(now - self._frame_at, _LEAST_STEP)
         self._frame_at = now
 
+    @property
+    def _not_taken(self) -> Sized:
+        """Events that wait for another frame: imgui takes a press and what follows it in different ones."""
+        queue: Sized = imgui.get_current_context().input_events_queue
+        return queue
+
     def hide(self) -> None:
         """Take the window off the screen."""
         glfw.hide_window(self._window)
@@ -356,7 +362,8 @@ class _Window:
         waits = [_IDLE_INTERVAL]
         for due_in in (self._at_hand.next_frame_in, self._at_hand.surroundings.next_frame_in):
             if due_in is not None:
-                waits.append(max(due_in, to_next_frame))
+                # That is so long after the frame by which it was told, however often has been waited since then.
+                waits.append(max(self._drawn_at + due_in - now, to_next_frame))
         if now - self._touched_at < _HOVER_SECONDS and self._at_hand.may_explain:
             waits.append(_HOVER_INTERVAL)
         if imgui.get_io().want_text_input:
@@ -389,8 +396,15 @@ class _Window:
         if self._interface is not None:
             self._interface.controller.touch()
 
-    def _pressed(self, *_: object) -> None:
-        self._presses += 1
+    def _key(self, _: object, key: int, __: int, action: int, ___: int) -> None:
+        """imgui knows no order within a frame: a key that goes down after Ctrl has come up would count as pressed with it. So
+        what follows is left to the next frame, as imgui does where one key goes down and up."""
+        if key in _MODIFIERS:
+            self._let_go = self._let_go or action == glfw.RELEASE
+        elif action == glfw.PRESS and self._let_go:
+            self._let_go = False
+            for down in (True, False):
+                imgui.get_io().add_key_event(_NO_KEY, down)
         self._touched()
 
     def _dropped(self, _: object, paths: Sequence[str]) -> None:
