@@ -22,10 +22,11 @@ from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.exports import Exports, take_plan
 from app.eyes import Eyes
-from app.focusing import FocusFacts, captured_sliced, captured_summed, carried_disparity, focus_limits
+from app.focusing import FocusFacts, captured_sliced, captured_summed, carried_disparity, focus_limits, within
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
+from app.looking import LEVELS
 from app.on_screen import OnScreen, viewpoint_of
 from app.readout import Compared, Readout
 from app.samples import Samples
@@ -82,6 +83,7 @@ class Controller:
         self._grid: Grid | None = None
         self._screen = OnScreen()
         self._shown: Point | None = None  # viewpoint at the last tick
+        self._aimed: LightField | None = None  # for which focus and level have been chosen
         self._heading: Point = (0.0, 0.0)
         self._moved_at = -math.inf
         self._acted_at = -math.inf
@@ -173,6 +175,7 @@ class Controller:
             return
         self._play(now)
         self._sway.move(self.state, now)
+        self._aim(self.light_field)
         self._pick()
         if self._shown != self.viewpoint:
             self._follow(self.light_field)
@@ -335,6 +338,16 @@ class Controller:
         if stop.focus is not None:
             self.state.focusing = replace(self.state.focusing, aperture=choices.aperture)
             self.state.refocus_at(stop.focus)
+
+    def _aim(self, light_field: LightField) -> None:
+        """Where all disparities of what is open lie far from 0, focus, convergence and level of the sweep begin among them."""
+        if self._screen.span is None or self._aimed is light_field:
+            return
+        self._aimed = light_field
+        limits = focus_limits(self._screen.span)
+        if limits[0] > LEVELS[1] or limits[1] < LEVELS[0]:
+            self.state.focusing = self.state.focusing.within(limits)
+            self.state.looking = replace(self.state.looking, level=within(self.state.looking.level, limits))
 
     def _pick(self) -> None:
         """Focus on the point that was clicked, as soon as its disparity is known."""

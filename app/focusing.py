@@ -54,6 +54,10 @@ class Focusing:
             convergence=_between(self.convergence, (-MAX_FOCUS, MAX_FOCUS)),
         )
 
+    def within(self, limits: tuple[float, float]) -> Focusing:
+        """With focus and convergence in the middle of these disparities where they lie outside, and nothing would be sharp."""
+        return replace(self, focus=within(self.focus, limits), convergence=within(self.convergence, limits))
+
     def focused_at(self, disparity: float) -> Focusing:
         """Sharp at this disparity."""
         return replace(self, focus=disparity).bounded()
@@ -81,6 +85,12 @@ class FocusFacts:
     summed: str = ""
     under: float | None = None
     exact_eyes: bool = False
+
+
+def within(disparity: float, limits: tuple[float, float]) -> float:
+    """The disparity, or the middle of the limits where it lies outside."""
+    low, high = limits
+    return disparity if low <= disparity <= high else (low + high) / 2
 
 
 def captured_summed(choice: Choice, rows: int, columns: int, span: tuple[float, float] | None) -> bool:

@@ -244,7 +244,7 @@ class Surroundings:
             if folder is not None:
                 return list_folder(folder)
             if source is None:
-                raise InputError("Nothing was opened yet whose folder could be shown: choose another folder.")
+                raise InputError("Only the sample was opened yet, which lies in no folder of yours: choose another folder.")
             return list_folder(folder_around(source))
 
         self._lister.submit(job)

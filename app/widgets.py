@@ -236,7 +236,7 @@ def slider(label: str, value: float, limits: tuple[float, float], shown: str, hi
     imgui.align_text_to_frame_padding()
     text(label, theme.TEXT_SOFT)
     imgui.same_line(4.5 * em())
-    value_width = 3.4 * em()
+    value_width = max(3.4 * em(), imgui.calc_text_size(shown).x + 0.5 * em())
     imgui.set_next_item_width(imgui.get_content_region_avail().x - value_width)
     changed, moved = imgui.slider_float(f"##{label}", value, *limits, "", flags | imgui.SliderFlags_.always_clamp.value)
     tooltip(hint)
@@ -250,6 +250,26 @@ def slider(label: str, value: float, limits: tuple[float, float], shown: str, hi
 def packed(colour: ImVec4) -> int:
     """The colour as imgui's draw lists take it."""
     return imgui.get_color_u32(colour)
+
+
+TAG_GAP = "   "  # between a tag's name and what is left out first where there is no room
+
+
+def fitting_tag(words: str, room: float) -> tuple[str, float] | None:
+    """As much of a tag's words as there is room for, and its width; None where there is none."""
+    around = 1.3 * em()
+    if imgui.calc_text_size(words).x + around > room:
+        words = elided(words.partition(TAG_GAP)[0], room - around)
+    width = imgui.calc_text_size(words).x + around
+    return (words, width) if width <= room else None
+
+
+def tag(words: str, colour: ImVec4, x: float, y: float, width: float) -> None:
+    """Words on a plate over the picture, so wide, from this corner on."""
+    brush = imgui.get_background_draw_list()
+    height = imgui.calc_text_size(words).y + 0.64 * em()
+    brush.add_rect_filled(ImVec2(x, y), ImVec2(x + width, y + height), packed(theme.LABEL), em() * 0.35)
+    brush.add_text(ImVec2(x + 0.65 * em(), y + 0.32 * em()), packed(colour), words)
 
 
 def elided(words: str, width: float) -> str:

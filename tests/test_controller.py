@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from moving_scene import DISPARITY, TruthSynthesizer, light_field, truth
 
@@ -19,7 +21,7 @@ from lfcore.errors import InputError, WeightsError
 from lfcore.lightfield import LightField
 from lfcore.metrics import k16
 from lfcore.store import ViewStore
-from lfcore.synthesis import Synthesis
+from lfcore.synthesis import Synthesis, never
 
 PATIENCE = 10.0
 Progress = Callable[[float], None]
@@ -541,6 +543,26 @@ def test_idle_time_is_used_for_what_may_be_wanted_next_and_none_of_it_twice(prog
     program.tick()
     assert program.controller.step is Step.FULL  # on the next frame
     assert len(program.synthesizer.asked) == before
+
+
+@pytest.mark.parametrize(("disparity", "begins"), [(-6.0, 0.0), (57.0, 57.0)])
+def test_focus_and_levels_begin_where_a_scene_is_that_lies_far_from_0(disparity: float, begins: float) -> None:
+    class Far(TruthSynthesizer):
+        def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
+            found = super().synthesize(u, v, cancelled)
+            return replace(found, disparity=np.full(found.image.shape[:2], disparity, np.float32))
+
+    program = Program(Far())
+    try:
+        program.open("3x3")
+        program.until_full()
+        state = program.controller.state
+        assert state.focusing.focus == state.focusing.convergence == state.looking.level == begins
+        state.refocus_at(-3.0)  # and whatever is then chosen stays
+        program.tick()
+        assert state.focusing.focus == -3.0
+    finally:
+        program.controller.stop()
 
 
 def test_foresight_goes_along_the_direction_of_travel_first(program: Program) -> None:

@@ -13,7 +13,7 @@ from app.geometry import Rect, Size
 from app.panes import Pane, handle
 from app.readout import Readout, ScoreText
 from app.state import Look, Step, ViewState
-from app.widgets import FIXED, decibels, em, number, packed, tooltip, window
+from app.widgets import FIXED, TAG_GAP, decibels, em, fitting_tag, number, packed, tag, tooltip, window
 from lfcore import colormaps
 
 _STEPS = 32
@@ -25,25 +25,21 @@ def names(panes: tuple[Pane, ...], state: ViewState, readout: Readout) -> None:
     if len(panes) == 1:
         return
     own, partner = panes
-    brush = imgui.get_background_draw_list()
-    pad_x, pad_y = em() * 0.65, em() * 0.32
     named = ((own_name(state, readout), own.clip, True), (partner_name(state, readout), partner.clip, False))
     for words, area, at_right in named:
-        size = imgui.calc_text_size(words)
-        width = size.x + 2 * pad_x
-        if width + em() > area.width or area.height < 6 * em():
+        fitting = fitting_tag(words, area.width - em())
+        if fitting is None or area.height < 6 * em():
             continue
+        shown, width = fitting
         x = area.x + area.width - em() * 0.5 - width if at_right else area.x + em() * 0.5
-        end = ImVec2(x + width, area.y + em() + size.y + 2 * pad_y)
-        brush.add_rect_filled(ImVec2(x, area.y + em()), end, packed(theme.LABEL), em() * 0.35)
-        brush.add_text(ImVec2(x + pad_x, area.y + em() + pad_y), packed(theme.TEXT), words)
+        tag(shown, theme.TEXT, x, area.y + em(), width)
 
 
 def own_name(state: ViewState, readout: Readout) -> str:
     """What the picture itself is."""
     if state.look is Look.ERROR:
         score = readout.compared.score if readout.compared.there else None
-        return difference_name(state) + (f"   {score_words(score)}" if score is not None else "")
+        return difference_name(state) + (f"{TAG_GAP}{score_words(score)}" if score is not None else "")
     if state.look is not Look.SYNTHESIS:
         return state.look.value
     if readout.step is Step.CAPTURED:
@@ -56,7 +52,7 @@ def partner_name(state: ViewState, readout: Readout) -> str:
     partner, score = state.comparison.partner, readout.compared.score
     if readout.compared.there:
         of_what_is_shown = state.look is Look.SYNTHESIS and readout.step is not Step.CAPTURED
-        return f"{partner}   {score_words(score)}" if score is not None and of_what_is_shown else partner
+        return f"{partner}{TAG_GAP}{score_words(score)}" if score is not None and of_what_is_shown else partner
     if partner == CAPTURED_VIEW:
         return "no captured view here"
     return f"{partner}: not yet" if partner != INSTANT else "no disparity yet"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import ImVec4
 
 from app import theme
 from app.commands import Context
@@ -11,7 +11,7 @@ from app.geometry import Rect
 from app.overlays import comparison
 from app.readout import Readout
 from app.state import Look, Step, ViewState
-from app.widgets import PASSIVE, button, card, em, number, packed, wrapped
+from app.widgets import PASSIVE, button, card, em, fitting_tag, number, tag, wrapped
 from lfcore.lightfield import is_extrapolated
 
 
@@ -39,19 +39,13 @@ def notices(area: Rect, state: ViewState, readout: Readout) -> None:
         labels.append(("No captured view here", theme.TEXT_SOFT))
     if not labels or area.height < 6 * em():
         return
-    brush = imgui.get_background_draw_list()
-    pad_x, pad_y = em() * 0.65, em() * 0.32
-    x = area.x + em()
+    x, end = area.x + em(), area.x + area.width
     for words, colour in labels:
-        size = imgui.calc_text_size(words)
-        if x + size.x + 2 * pad_x > area.x + area.width:
+        fitting = fitting_tag(words, end - x)
+        if fitting is None:
             break
-        top = area.y + em()
-        brush.add_rect_filled(
-            ImVec2(x, top), ImVec2(x + size.x + 2 * pad_x, top + size.y + 2 * pad_y), packed(theme.LABEL), em() * 0.35
-        )
-        brush.add_text(ImVec2(x + pad_x, top + pad_y), packed(colour), words)
-        x += size.x + 2 * pad_x + em() * 0.5
+        tag(fitting[0], colour, x, area.y + em(), fitting[1])
+        x += fitting[1] + em() * 0.5
 
 
 def _focus_words(state: ViewState, readout: Readout) -> str:
@@ -72,7 +66,7 @@ def missing(area: Rect, context: Context, readout: Readout) -> None:
         _no_partner(area, context, readout)
     elif look is Look.ERROR and context.state.comparison.difference.measured and not readout.compared.mapped:
         with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
-            wrapped("The map is computed when the picture is finished")
+            wrapped("Computing the map" if readout.step is Step.FULL else "The map is computed when the picture is finished")
     elif look.needs_disparity and not readout.has_disparity:
         with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
             wrapped("No disparity yet")
