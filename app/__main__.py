@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import difflib
+import errno
 import os
 import signal
 import sys
@@ -50,6 +51,10 @@ _EXAMPLES = """examples:
 `lfview VERB --help` tells more."""
 
 
+# How often a thread of torch looks for more work before it sleeps, a few tens of microseconds. Ten times as often, as libgomp
+# does else, is no faster where cores are free, and takes two to four times as long where other programs want them too.
+_SPINS = "30000"
+
 _WITH_PAIRS = ("--uv", "--from", "--to", "--focus")
 
 
@@ -83,6 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_normalised(given))
     except SystemExit as stop:  # argparse's way out after --help or a complaint
         return stop.code if isinstance(stop.code, int) else 2
+    os.environ.setdefault("GOMP_SPINCOUNT", _SPINS)
     try:
         status: int = options.run(options)
         sys.stdout.flush()
@@ -95,18 +101,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read the output has gone; give the interpreter something to flush into at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    except OSError as error:
+        if error.errno != errno.ENOSPC and error.filename is None:
+            return _bug(error, options.debug)
+        if error.errno != errno.ENOSPC:
+            _say(
+                f"lfview: {error.filename} cannot be used: {error.strerror}; check its name, where it lies and its permissions."
+            )
+            return 2
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _say("lfview: there is no room left for what was to be written; make some, or write elsewhere.")
+        return 2
     except Exception as error:
         if _is_out_of_memory(error):
             _say("lfview: there is not enough memory for this; use a smaller light field or close other programs.")
             return 2
-        if options.debug:
-            traceback.print_exc()
-        _say(
-            f"lfview: this is a bug ({type(error).__name__}: {error}); run the same command with --debug and report "
-            "what it prints."
-        )
-        return 1
+        return _bug(error, options.debug)
     return status
+
+
+def _bug(error: Exception, debug: bool) -> int:
+    """Say that this should not have happened; returns the exit code."""
+    if debug:
+        traceback.print_exc()
+    _say(
+        f"lfview: this is a bug ({type(error).__name__}: {error}); run the same command with --debug and report what it prints."
+    )
+    return 1
 
 
 def _parser() -> argparse.ArgumentParser:

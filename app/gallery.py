@@ -46,6 +46,7 @@ class Gallery:
         self._seen: OrderedDict[Path, Seen] = OrderedDict()  # the one asked for longest ago first
         self._round = 0  # counts how often all was forgotten
         self._asked: frozenset[Path] = frozenset()  # what the worker has been given
+        self.complete = False  # all that was wanted last has been seen
 
     def seen(self, path: Path) -> Seen | None:
         """What is known of this path; None where it has not been looked at yet."""
@@ -58,6 +59,7 @@ class Gallery:
         """Once a frame: look at these next, the first ones first, and at no others any more."""
         self._collect()
         missing = [path for path in paths[:HELD] if path not in self._seen]
+        self.complete = not missing
         if self._asked and not self._asked.intersection(missing):
             self._worker.cancel_all()
             self._asked = frozenset()

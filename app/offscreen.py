@@ -82,7 +82,8 @@ class Offscreen:
 
 
 def screenshot(path: Path, out: Path, model: str = "full", size: Size = (1280, 800), scale: float = 1.0) -> None:
-    """Write the viewer as it looks when the light field at `path` is open and its centre view is synthesized, as PNG.
+    """Write the viewer as it looks when the light field at `path` is open and its centre view is synthesized, or all those in
+    sight of a folder are seen, as PNG.
 
     Raises LfviewError where the light field cannot be opened, the model not loaded, or OpenGL is missing.
     """
@@ -139,6 +140,8 @@ def _wait_for_synthesis(viewer: Offscreen) -> None:
         if controller.messages:
             raise LfviewError(controller.messages[0])
         if controller.exhibition is not None or (controller.picture is not None and controller.picture.final):
+            return
+        if viewer.interface.surroundings.all_seen:
             return
         if time.monotonic() > deadline:
             raise LfviewError(f"The synthesis took more than {PATIENCE_SECONDS:.0f} s; try a smaller light field.")

@@ -154,6 +154,11 @@ class Surroundings:
         """Seconds until something is to be done by itself, or None."""
         return None if self._save_at is None else max(self._save_at - self._now, 0.0) + 1e-3
 
+    @property
+    def all_seen(self) -> bool:
+        """Whether a folder is shown, and every light field that is in sight."""
+        return self.controller.folder is not None and self._gallery.complete
+
     def shelf(self) -> Shelf:
         """What the panels list."""
         recent = tuple(map(Path, self.settings.recent))

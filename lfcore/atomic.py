@@ -6,10 +6,19 @@ import contextlib
 import os
 import tempfile
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 from lfcore.errors import OutputError
+
+
+def _umask() -> int:
+    value = os.umask(0)
+    os.umask(value)
+    return value
+
+
+_UMASK = _umask()  # once, before there are threads: it can only be read by setting it, which they must not see
+_MOST_OF_NAME = 32  # characters of the target's name in that of the temporary file, since names are at most 255 bytes long
 
 
 @contextlib.contextmanager
@@ -20,10 +29,10 @@ def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
     counts as failure. Raises OutputError where the folder is missing or not writable, or the disk is full.
     """
     target = Path(target)
-    if target.is_dir():
-        raise OutputError(f"Cannot write {target}: it is a folder; give the name of a file.")
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
+        if target.is_dir():
+            raise OutputError(f"Cannot write {target}: it is a folder; give the name of a file.")
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem[:_MOST_OF_NAME]}.", suffix=target.suffix, dir=target.parent)
     except OSError as error:
         raise _output_error(target, error) from error
     os.close(handle)
@@ -31,7 +40,7 @@ def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         # mkstemp makes files that only the owner may read; give the target the mode a plain open() would have given it.
-        temporary.chmod(0o666 & ~_umask())
+        temporary.chmod(0o666 & ~_UMASK)
         temporary.replace(target)
     except OSError as error:
         raise _output_error(target, error) from error
@@ -42,10 +51,3 @@ def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
 def _output_error(target: Path, error: OSError) -> OutputError:
     reason = error.strerror or str(error)
     return OutputError(f"Cannot write {target}: {reason}; choose another place or make room there.")
-
-
-@cache  # it can only be read by setting it, which other threads must not see time and again
-def _umask() -> int:
-    value = os.umask(0)
-    os.umask(value)
-    return value

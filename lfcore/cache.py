@@ -46,8 +46,8 @@ class SynthesisCache:
     """Syntheses by key, at most `limit_bytes` of them; what was used longest ago goes first. Safe to use from threads.
 
     Image and disparity are held as float16 (rounding: below 0.13 of a level of 8 bits; at most 0.004 px of disparity
-    up to 16 px, 0.008 px up to 32 px), weights as they are, 4 bytes a pixel more; the warped inputs, large and quickly made
-    again, are not held.
+    up to 16 px, 0.008 px up to 32 px, twice as much for each doubling), weights as they are, 4 bytes a pixel more; the warped
+    inputs, large and quickly made again, are not held.
     """
 
     def __init__(self, limit_bytes: int = 512 * 2**20) -> None:

@@ -201,6 +201,8 @@ def disparity_range(toned: Tensor, tuning: Tuning) -> tuple[float, float]:
     A sweep at the middle view tells at half size; only pixels whose best level stands out count, and the outermost
     thousandth on each side does not.
     """
+    if min(toned.shape[2:]) < 2:
+        return _WIDEST.low, _WIDEST.high
     half = F.avg_pool2d(toned, 2)  # (4, 3, h / 2, w / 2)
     levels = Levels(_WIDEST.count // 2 + 1, _WIDEST.low / 2, _WIDEST.high / 2)
     offsets = corner_offsets(0.5, 0.5)

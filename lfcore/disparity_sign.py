@@ -14,6 +14,7 @@ from __future__ import annotations
 import enum
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -131,19 +132,41 @@ def check_disparity(light_field: LightField) -> DisparityCheck:
     """Find out from four corner views in which arrangement they match, and at which disparities. Takes about 0.3 s, where
     they lie far apart half as long again.
 
-    The corners are those of the largest square in the middle of the grid whose corner views are not dark. Disparities are
-    found up to three eighths of the views' shorter side.
+    The corners are those of the grid, where one of them is dark of the largest part of it in the middle whose corners are not;
+    its sides are equal parts of the two baselines. Disparities are found up to three eighths of the views' shorter side.
     """
-    near, share = _look(light_field, _NEARER)
+    near, share = _look(light_field, _parts(light_field), _NEARER)
     if near.order is not Order.UNKNOWN and share < _NEAR_LIMIT:
         return near
-    far, _ = _look(light_field, _FARTHER)
+    far, _ = _look(light_field, _parts(light_field), _FARTHER)
     return near if far.order is Order.UNKNOWN else far
 
 
-def _look(light_field: LightField, look: _Look) -> tuple[DisparityCheck, float]:
-    """What it tells, and how much of its reach the disparities take; 0 where none are found."""
-    corners, scale = _square_corners(light_field, look.long_side)  # (4, h, w), full-baseline px per px here
+def baselines_differ(light_field: LightField) -> bool:
+    """Whether rows and columns lie equally far apart in a grid that has more of one than of the other.
+
+    A synthesis from its corners takes both baselines as equal, as a LightField says, which they are not then.
+    """
+    if light_field.rows == light_field.columns or check_disparity(light_field).order is not Order.UNKNOWN:
+        return False
+    squares = [(side - 1, side - 1) for side in range(min(light_field.rows, light_field.columns), 1, -1)]
+    return any(_look(light_field, squares, look)[0].order is Order.AGREES for look in (_NEARER, _FARTHER))
+
+
+_Steps = tuple[int, int]  # rows and columns from the first to the last
+
+
+def _parts(light_field: LightField) -> list[_Steps]:
+    """Parts of the grid, the largest first, whose sides are equal parts of both baselines: one disparity holds along both."""
+    down, across = light_field.rows - 1, light_field.columns - 1
+    parts = math.gcd(down, across)
+    return [(down // parts * size, across // parts * size) for size in range(parts, 0, -1)]
+
+
+def _look(light_field: LightField, parts: Sequence[_Steps], look: _Look) -> tuple[DisparityCheck, float]:
+    """What the first of these parts tells that has no dark corner, and how much of its reach the disparities take; 0 where
+    none are found."""
+    corners, scale = _corners_of(light_field, parts, look.long_side)  # (4, h, w), full-baseline px per px here
     if corners is None:
         return _unknown(), 0.0
     reach = look.tried(*corners.shape[1:])
@@ -152,16 +175,17 @@ def _look(light_field: LightField, look: _Look) -> tuple[DisparityCheck, float]:
     return check, taken
 
 
-def _square_corners(light_field: LightField, long_side: int) -> tuple[FloatArray | None, float]:
-    """The four corner pictures in the order (top, left), (top, right), (bottom, left), (bottom, right), made comparable."""
-    rows, columns = light_field.rows, light_field.columns
-    for side in range(min(rows, columns), 1, -1):
-        top, left = (rows - side) // 2, (columns - side) // 2
-        places = list(itertools.product((top, top + side - 1), (left, left + side - 1)))
-        if not light_field.dark.intersection(places):
-            shrink = math.ceil(max(light_field.height, light_field.width) / long_side)
+def _corners_of(light_field: LightField, parts: Sequence[_Steps], long_side: int) -> tuple[FloatArray | None, float]:
+    """The four corner pictures of the first part, in the middle, without a dark one, in the order (top, left), (top, right),
+    (bottom, left), (bottom, right), made comparable."""
+    rows, columns, height, width = light_field.views.shape[:4]
+    for down, across in parts:
+        top, left = (rows - 1 - down) // 2, (columns - 1 - across) // 2
+        places = list(itertools.product((top, top + down), (left, left + across)))
+        if min(down, across) > 0 and not light_field.dark.intersection(places):
+            shrink = min(math.ceil(max(height, width) / long_side), height, width)
             pictures = np.stack([_comparable(light_field.views[place], shrink) for place in places])
-            return pictures, shrink * (columns - 1) / (side - 1)
+            return pictures, shrink * (columns - 1) / across
     return None, 1.0
 
 

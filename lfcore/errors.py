@@ -6,7 +6,10 @@ program shows them in one place (the command line as one line with exit code 2, 
 
 
 class LfviewError(Exception):
-    """Base of every error whose text is written for the user."""
+    """Base of every error whose text is written for the user; one line, though names of files may hold more."""
+
+    def __str__(self) -> str:
+        return " ".join(super().__str__().splitlines())
 
 
 class InputError(LfviewError):

@@ -66,6 +66,13 @@ def check_folder_target(folder: str | os.PathLike[str]) -> Path:
     return path
 
 
+def check_no_views(folder: Path) -> None:
+    """Make sure that there are no views in the folder, which those to be written would be taken together with. Raises
+    OutputError."""
+    if any(folder.glob("view_*")):
+        raise OutputError(f"Cannot write views to {folder}: it holds some already; choose another folder or empty this one.")
+
+
 def make_folder(folder: str | os.PathLike[str]) -> Path:
     """The folder, made with its parents if it is missing, and checked to be writable. Raises OutputError."""
     path = Path(folder)

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from lfcore.errors import OutputError
 
+_CODE = (".py", ".c", ".h", ".so", ".pyd")  # what was compiled stands for C where that is not installed
+
 
 @dataclass(frozen=True)
 class KeptFile:
@@ -83,10 +85,11 @@ def remove(path: Path) -> bool:
 
 
 @cache
-def code_digest(package: str) -> str:
-    """Digest of the sources of a package, without those below it: what other code has made is not shown as this program's."""
+def code_digest(*packages: str) -> str:
+    """Digest of the sources of packages, without those below them: what other code has made is not shown as this program's."""
     digest = hashlib.blake2b(digest_size=16)
-    for module in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
-        if module.name.endswith(".py"):
-            digest.update(module.name.encode() + module.read_bytes())
+    for package in packages:
+        for module in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
+            if module.name.endswith(_CODE):
+                digest.update(module.name.encode() + module.read_bytes())
     return digest.hexdigest()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lfcore.errors import InputError
+from lfcore.key_frames import MAX_FOCUS
 
 MAX_VIEWS = 64  # along one side of a grid or a quilt
 _ENDING = re.compile(r"_qs\d+x\d+a[\d.]+$")
@@ -27,6 +28,9 @@ class Quilt:
             raise InputError(
                 f"A quilt of {self.columns} x {self.rows} views was asked for; give from 1 x 2 to {MAX_VIEWS} x {MAX_VIEWS}."
             )
+
+        if not abs(self.focus) <= MAX_FOCUS:  # as it stands, NaN is caught too
+            raise InputError(f"The focus is {self.focus:g}; it must lie from {-MAX_FOCUS:g} to {MAX_FOCUS:g} px of disparity.")
 
     def place(self, number: int) -> tuple[int, int]:
         """(row from the top, column) of view `number`, from 0 at the left of the scene: the bottom left comes first."""

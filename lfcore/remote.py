@@ -85,7 +85,8 @@ class SynthesisProcess:
         if not self._lock.acquire(timeout=_END_SECONDS):
             process = self._process
             if process is not None:
-                process.kill()
+                with contextlib.suppress(ValueError):  # the query has just ended it
+                    process.kill()
             self._lock.acquire()
         try:
             self._end()
@@ -96,7 +97,10 @@ class SynthesisProcess:
     def pid(self) -> int | None:
         """The number that the system gave to the process; None while it does not run."""
         process = self._process
-        return process.pid if process is not None and process.is_alive() else None
+        try:
+            return process.pid if process is not None and process.is_alive() else None
+        except ValueError:  # another thread has just ended it
+            return None
 
     @property
     def shared_memory_name(self) -> str | None:

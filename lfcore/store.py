@@ -139,7 +139,7 @@ class ViewStore:
                     yield Path(entry.path)
 
     def _folder(self, content: str, model: str) -> Path:
-        maker = hashlib.blake2b(f"{model} {code_digest('lfcore')}".encode(), digest_size=8).hexdigest()
+        maker = hashlib.blake2b(f"{model} {code_digest('lfcore', 'lfcore.kernels')}".encode(), digest_size=8).hexdigest()
         seen = hashlib.blake2b(content.encode(), digest_size=8).hexdigest()
         return self.root / f"{seen}-{maker}"
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ MAX_KEY_FRAMES = 1000
 SCALE_LIMITS = (0.05, 8.0)
 GAIN_LIMITS = (1.0, 64.0)
 MAX_PLAYS = 65_535  # what a GIF can count
+MIN_FPS = 0.01
 MAX_FPS = 240.0
 _KEY = "lfview_sweep"
 
@@ -109,7 +109,7 @@ class SweepPlan:
     plays: int = 0  # of an animated .webp or .gif; 0: for ever
 
     def __post_init__(self) -> None:
-        _check_range("rate in frames per second", self.fps, (0.0, MAX_FPS), above=True)
+        _check_range("rate in frames per second", self.fps, (MIN_FPS, MAX_FPS))
         _check_range("scale", self.scale, SCALE_LIMITS)
         _check_range("gain", self.gain, GAIN_LIMITS)
         _check_range("aperture", self.aperture, (0.0, 2.0))
@@ -276,11 +276,10 @@ def _layer(name: str, value: object) -> Layer:
     raise InputError(f'"{name}" must be one of {", ".join(layer.value for layer in Layer)}.')
 
 
-def _check_range(name: str, value: float, limits: tuple[float, float], above: bool = False) -> None:
+def _check_range(name: str, value: float, limits: tuple[float, float]) -> None:
     low, high = limits
-    if not (math.isfinite(value) and (low < value if above else low <= value) and value <= high):
-        least = "above" if above else "at least"
-        raise InputError(f"The {name} is {value:g}; it must be {least} {low:g} and at most {high:g}.")
+    if not low <= value <= high:  # as it stands, NaN is caught too
+        raise InputError(f"The {name} is {value:g}; it must be at least {low:g} and at most {high:g}.")
 
 
 def _refuse_constant(word: str) -> float:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from lfcore.errors import Cancelled, InputError, OutputError
-from lfcore.export import check_folder_target, check_target, make_folder, write_picture, write_rows
+from lfcore.errors import Cancelled, InputError
+from lfcore.export import check_folder_target, check_no_views, check_target, make_folder, write_picture, write_rows
 from lfcore.formats.eslf import LENSLET
 from lfcore.formats.images import MAX_BYTES
 from lfcore.lightfield import FloatArray, LightField
@@ -45,8 +45,7 @@ def check_grid_target(path: str | os.PathLike[str], side: int, light_field: Ligh
             raise InputError(f"This ESLF would take {needed / 2**30:.1f} GiB of memory; name a folder instead.")
         return check_target(target, (".png",))
     folder = check_folder_target(target)
-    if any(folder.glob("view_*")):
-        raise OutputError(f"Cannot write views to {folder}: it holds some already; choose another folder or empty this one.")
+    check_no_views(folder)
     return folder
 
 

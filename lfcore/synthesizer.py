@@ -82,7 +82,7 @@ class MeanSynthesizer:
         check_viewpoint(u, v)
         check_cancelled(cancelled)
         start = time.perf_counter()
-        image = self._corners.mean(0)
+        image = np.clip(self._corners.mean(0), 0, 1)
         return Synthesis(u, v, self.name, image, None, None, {"total": time.perf_counter() - start})
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -22,10 +21,10 @@ from av.filter.context import FilterContext
 from lfcore.atomic import atomic_path
 from lfcore.errors import InputError, OutputError
 from lfcore.export import check_target
+from lfcore.sweep_plan import MAX_FPS, MIN_FPS
 
 ByteArray = npt.NDArray[np.uint8]
 
-MAX_FPS = 240.0
 _GIF_MAX_FPS = 50.0  # a GIF counts in hundredths of a second, and browsers slow down frames shorter than two of them
 _BT709 = 1  # the number of BT.709 in the tables of ISO/IEC 23091-2 for primaries, transfer and matrix alike
 
@@ -61,8 +60,8 @@ def check_video_target(path: str | os.PathLike[str], fps: float) -> Path:
     """Make sure, before long work, that this file can be written at this rate. Raises OutputError or InputError."""
     target = check_target(path, VIDEO_EXTENSIONS)
     limit = _GIF_MAX_FPS if target.suffix.lower() == ".gif" else MAX_FPS
-    if not (math.isfinite(fps) and 0 < fps <= limit):
-        raise InputError(f"The rate is {fps:g} frames per second; it must be above 0 and at most {limit:g} here.")
+    if not MIN_FPS <= fps <= limit:  # as it stands, NaN is caught too
+        raise InputError(f"The rate is {fps:g} frames per second; it must be from {MIN_FPS:g} to {limit:g} here.")
     return target
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import tarfile
 from pathlib import Path
 
@@ -229,6 +230,16 @@ def test_a_folder_is_searched_three_levels_deep(tmp_path: Path, capture: Path) -
 def test_a_single_white_image_stands_for_itself(tmp_path: Path, capture: Path) -> None:
     folder = save(tmp_path / "a", white_files(SETTINGS))
     assert level(choose(capture, folder / "MOD_0003.RAW")) == 702
+
+
+def test_a_white_image_that_was_replaced_is_another_choice(tmp_path: Path, capture: Path) -> None:
+    folder = save(tmp_path / "a", white_files(SETTINGS))
+    file = caldata(tmp_path / "caldata-1.tar")
+    for path in (folder / "MOD_0003.RAW", file):
+        before = choose(capture, path)
+        assert repr(choose(capture, path)) == repr(before)  # by which decoded captures are found again
+        os.utime(path, ns=(1, 1))
+        assert repr(choose(capture, path)) != repr(before)
 
 
 def test_calibration_beside_the_capture_is_found(capture: Path) -> None:

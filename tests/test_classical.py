@@ -142,3 +142,10 @@ def test_it_is_a_model_like_the_others() -> None:
     calls = iter([False, False, True])
     with pytest.raises(Cancelled):
         synthesizer.synthesize(0.5, 0.5, lambda: next(calls))
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 2), (40, 1)])
+def test_views_of_a_single_row_or_column_have_a_synthesis(size: tuple[int, int]) -> None:
+    synthesizer = PlaneSweepSynthesizer()
+    synthesizer.set_light_field(LightField(np.full((2, 2, *size, 3), 128, np.uint8), "thin", "", ""))
+    np.testing.assert_allclose(synthesizer.synthesize(0.3, 0.6).image, 128 / 255, atol=1e-3)

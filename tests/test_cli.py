@@ -267,13 +267,41 @@ def test_eval_names_what_cannot_be_scored_and_scores_the_rest(
     output = capsys.readouterr()
     assert "only the four corner views" in output.err
     assert [entry["name"] for entry in json.loads(scores.read_text())["scenes"]] == ["a scene é"]
+    assert main(["eval", str(tmp_path / "none"), str(scene), "--model", "mean", "--json", str(scores)]) == 2
+    assert "none does not exist" in capsys.readouterr().err
+    assert [entry["name"] for entry in json.loads(scores.read_text())["scenes"]] == ["a scene é"]
+
+
+def test_what_is_to_be_minded_about_a_light_field_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for row in range(2):
+        for column in range(2):
+            view = oiio.ImageBuf(oiio.ImageSpec(40, 30, 3, oiio.FLOAT))
+            view.set_pixels(oiio.ROI(), np.full((30, 40, 3), (np.nan, 0.5, 7.0), np.float32))
+            assert view.write(str(tmp_path / f"view_{row}_{column}.exr"))
+    assert main(["synth", str(tmp_path), "--uv", "0.5,0.5", "--model", "mean", "--out", str(tmp_path / "out.exr")]) == 0
+    said = capsys.readouterr().err
+    assert "4800 values that are no finite numbers were set to 0" in said
+    assert "33.3% of the values lie above 1, up to 7" in said
+    np.testing.assert_array_equal(read(tmp_path / "out.exr")[5, 5], (0, 0.5, 1))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_want_of_room_on_standard_output_is_no_bug(scene: Path) -> None:
+    command = [sys.executable, "-m", "app", "info", str(scene)]
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[1])
+    assert ended.returncode == 2
+    assert "no room" in one_sentence(ended.stderr)
 
 
 def test_scenes_of_a_folder_and_labels_of_models(scene: Path, tmp_path: Path) -> None:
     for name in ("b", "a"):
         write_views(tmp_path / name, make_views(2, 2))
     (tmp_path / "README.md").write_text("scenes")
+    (tmp_path / "self").symlink_to("self")
     assert scenes_in([tmp_path, scene]) == [tmp_path / "a", tmp_path / "b", scene]
+    (tmp_path / "overview.png").write_bytes(b"a picture beside them")
+    assert scenes_in([tmp_path]) == [tmp_path / "a", tmp_path / "b", tmp_path / "overview.png"]
     assert labelled(["full", "x/w.safetensors", "full"]) == {"full": "full", "w": "x/w.safetensors"}
     with pytest.raises(InputError, match="rename"):
         labelled(["x/w.safetensors", "y/w.safetensors"])
@@ -383,6 +411,15 @@ def one_sentence(output: str) -> str:
         (["sweep", "SCENE", "--out", "DIR/a.mp4", "--fps", "nan"], "frames per second"),
         (["sweep", "SCENE", "--out", "DIR/a.mp4", "--radius", "0.6"], "radius"),
         (["sweep", "SCENE", "--out", "DIR/a.mp4", "--path", "zigzag"], "zigzag"),
+        (["sweep", "SCENE", "--out", "DIR/a.mp4", "--fps", "0.0004"], "frames per second"),
+        (["synth", "SCENE", "--quilt", "2x1", "--focus", "nan", "--model", "mean", "--out", "DIR/a.png"], "The focus is nan"),
+        (["synth", "SCENE", "--quilt", "2x1", "--focus", "1e9", "--model", "mean", "--out", "DIR/a.png"], "The focus is 1e+09"),
+        (["info", f"DIR/{'x' * 300}"], "File name too long"),
+        (["synth", "SCENE", "--uv", "0,0", "--model", "mean", "--out", f"DIR/{'x' * 300}.png"], "File name too long"),
+        (["synth", "DIR/two\nlines", "--uv", "0,0", "--out", "DIR/a.png", "--model", "mean"], "two lines does not exist"),
+        (["train", "--data", "SCENE", "--out", "DIR/w.safetensors", "--seed", "-1"], "'-1'"),
+        (["train", "--data", "SCENE", "--out", "DIR/w.safetensors", "--generated", "-1"], "'-1'"),
+        (["train", "--data", "SCENE", "--out", "DIR/w.safetensors", "--threads", "100000"], "100000 threads"),
         (["eval", "DIR/none", "--model", "mean"], "does not exist"),
         (["eval", "SCENE", "--model", "mean", "--json", "DIR/scores.txt"], ".json"),
         (["eval", "SCENE", "--model", "mean", "--protocol", "other"], "K16"),

@@ -112,3 +112,18 @@ def test_ctrl_c_leaves_no_file_behind(scenes: Path, tmp_path: Path, monkeypatch:
     report = tmp_path / "report.html"
     assert main(["eval", str(scenes / "three"), "--model", "mean", "--report", str(report)]) == 130
     assert list(tmp_path.iterdir()) == []
+
+
+def test_scenes_of_one_name_keep_their_own_noise(tmp_path: Path) -> None:
+    paths = []
+    for folder, spread in (("a", 2), ("b", 5)):
+        (tmp_path / folder / "scene").mkdir(parents=True)
+        values = 120 + np.random.default_rng(1).normal(0, spread, (3, 3, 64, 72, 3))
+        for row in range(3):
+            for column in range(3):
+                write_picture(tmp_path / folder / "scene" / f"view_{row}_{column}.png", values[row, column].astype(np.uint8))
+        paths.append(str(tmp_path / folder / "scene"))
+    target = tmp_path / "scores.json"
+    assert main(["eval", *paths, "--model", "mean", "--noise", "--json", str(target)]) == 0
+    noises = [scene["noise"]["captured"][0] for scene in json.loads(target.read_text())["scenes"]]
+    assert noises == [pytest.approx(2, rel=0.1), pytest.approx(5, rel=0.1)]

@@ -154,6 +154,11 @@ def test_decoding_to_views_names_captures_that_fail(capture: Path, tmp_path: Pat
     linear = 255 * srgb(views.views / 65535)
     assert np.abs(linear - tones).max() < 1
 
+    before = sorted((tmp_path / "out" / "capture").iterdir())
+    assert main(["decode", str(capture), "--out", str(tmp_path / "out"), "--views", "3"]) == 2
+    assert "holds some already" in capsys.readouterr().err
+    assert sorted((tmp_path / "out" / "capture").iterdir()) == before
+
 
 @pytest.mark.parametrize(
     ("arguments", "words"),

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lfcore.disparity_sign import Order, check_disparity
+from lfcore.disparity_sign import Order, baselines_differ, check_disparity
 from lfcore.formats import open_light_field
+from lfcore.formats.checks import with_warnings
 from lfcore.lightfield import LightField
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -134,3 +135,29 @@ def test_real_light_fields_are_judged_right_in_every_order(scene: Path) -> None:
     for name, (rearrange, expected) in CHANGES.items():
         check = check_disparity(dataclasses.replace(light_field, views=rearrange(light_field.views)))
         assert check.order is expected, name
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(3, 5), (9, 3), (2, 4), (5, 9)])
+@pytest.mark.parametrize("disparity", [-12.0, 6.0])
+def test_of_other_grids_than_square_ones_the_baselines_count_as_equal(rows: int, columns: int, disparity: float) -> None:
+    light_field = wrap(two_planes(near=disparity, far=disparity, rows=rows, columns=columns))
+    check = check_disparity(light_field)
+    assert check.order is Order.AGREES
+    assert check.median == pytest.approx(disparity, abs=0.5)
+    assert not baselines_differ(light_field)
+    assert check_disparity(wrap(light_field.views[::-1])).order is Order.REVERSED
+
+
+def test_a_grid_whose_views_lie_equally_far_apart_along_different_numbers_of_them_is_told() -> None:
+    square = two_planes(near=12.0, far=-8.0, rows=5, columns=5)
+    assert not baselines_differ(wrap(square))
+    light_field = wrap(square[1:4])
+    assert check_disparity(light_field).order is Order.UNKNOWN
+    assert baselines_differ(light_field)
+    assert "two baselines differ" in with_warnings(light_field).warnings[0]
+
+
+@pytest.mark.parametrize("size", [(3, 1000), (12, 4000), (1, 400), (4000, 10)])
+def test_very_long_views_cannot_be_told(size: tuple[int, int]) -> None:
+    views = np.random.default_rng(2).integers(0, 255, (2, 2, *size, 3), dtype=np.uint8)
+    assert check_disparity(wrap(views)).order is Order.UNKNOWN

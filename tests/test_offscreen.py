@@ -15,7 +15,9 @@ from app.engine import Engine
 from app.geometry import Zoom, place
 from app.interface import path_from_text
 from app.layout import lay_out
+from app.opening import open_by_content
 from lfcore.errors import InputError
+from lfcore.export import write_image
 from lfcore.lightfield import FloatArray
 
 WINDOW = (900, 600)
@@ -90,3 +92,18 @@ def test_frame_times_are_measured_while_the_synthesis_runs() -> None:
 )
 def test_typed_paths(text: str, path: str) -> None:
     assert path_from_text(text) == Path(path)
+
+
+@pytest.mark.usefixtures("made_up")
+def test_the_screenshot_of_a_folder_shows_what_is_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("one", 0.3), ("two", 0.9)):
+        for row in range(2):
+            for column in range(2):
+                (tmp_path / "scenes" / name).mkdir(parents=True, exist_ok=True)
+                view = np.full((64, 96, 3), value, np.float32)
+                write_image(tmp_path / "scenes" / name / f"view_{row}_{column}.png", view)
+    monkeypatch.setattr(offscreen, "open_by_content", open_by_content)
+    offscreen.screenshot(tmp_path / "scenes", tmp_path / "viewer.png", size=WINDOW)
+    picture = read(tmp_path / "viewer.png")
+    for value in (0.3, 0.9):
+        assert (np.abs(picture - value).max(axis=2) < 0.01).sum() > 2000

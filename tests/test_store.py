@@ -13,8 +13,8 @@ import pytest
 from scenes import plane
 from test_cache import key, synthesis
 
+from lfcore import kept_files, thumbnails
 from lfcore import store as module
-from lfcore import thumbnails
 from lfcore.cache import CacheKey
 from lfcore.decode.kept import default_store, key_of
 from lfcore.errors import OutputError
@@ -64,8 +64,34 @@ def test_other_viewpoints_light_fields_models_and_code_find_nothing(store: ViewS
     for other in (key(0.25, 0.75), key(-0.25, 0.75, content="x"), key(-0.25, 0.75, model="x")):
         assert store.get(other, SIZE) is None
     assert store.positions("x", "m") == store.positions("lf", "x") == []
-    monkeypatch.setattr(module, "code_digest", lambda package: "of other code")
+    monkeypatch.setattr(module, "code_digest", lambda *packages: "of other code")
     assert store.get(key(-0.25, 0.75), SIZE) is None
+
+
+def test_keys_change_with_the_sources_of_all_code_that_decides_what_comes_out(
+    store: ViewStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept_files.resources, "files", lambda package: tmp_path / package)
+    sources = "lfcore/synthesizer.py", "lfcore.kernels/warp.c", "lfcore.decode/colour.py", "lfcore.formats/dark.py"
+    for name in (*sources, "lfcore.formats.lytro/metadata.py", "lfcore/notes.txt"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1")
+
+    def keys() -> tuple[Path, str]:
+        kept_files.code_digest.cache_clear()
+        return store._path(key(0.5, 0.5)), key_of("a capture")
+
+    try:
+        seen = [keys()]
+        for name in (*sources, "lfcore.formats.lytro/metadata.py"):
+            (tmp_path / name).write_text("2")
+            seen.append(keys())
+            view, decoded = (int(now != before) for now, before in zip(seen[-1], seen[-2], strict=True))
+            assert (view, decoded) == ((1, 0) if name in sources[:2] else (0, 1)), name
+        (tmp_path / "lfcore" / "notes.txt").write_text("2")
+        assert keys() == seen[-1]
+    finally:
+        kept_files.code_digest.cache_clear()
 
 
 def test_nothing_is_there_before_the_first_put(store: ViewStore) -> None:

@@ -423,3 +423,14 @@ def test_scenes_too_small_for_the_patch_are_refused_in_words(tmp_path: Path) -> 
     with pytest.raises(InputError, match="tiny"):
         out, run = tmp_path / "o.safetensors", tmp_path / "r"
         train(TrainConfig(steps=1), Runtime(device="cpu"), [field], [], out, run, print, lambda: False)
+
+
+def test_a_training_that_diverges_ends_in_a_sentence_and_writes_nothing(tmp_path: Path) -> None:
+    config = TrainConfig(
+        model="realtime", learning_rate=1e9, warm_up_steps=1, steps=5, loss=LossConfig(matching_steps=0), patches=SMALL
+    )
+    out = tmp_path / "o.safetensors"
+    scenes = [plane(2.0, (3, 3), (130, 150))]
+    with pytest.raises(InputError, match="diverged at step"):
+        train(config, Runtime(device="cpu"), scenes, [], out, tmp_path / "run", lambda progress: None, lambda: False)
+    assert not out.exists()

@@ -153,7 +153,9 @@ def test_no_frames_and_frames_of_two_sizes_are_refused(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("name", "fps"), [("v.mp4", 0), ("v.mp4", -1), ("v.mp4", float("nan")), ("v.mp4", 241), ("v.gif", 51)])
+@pytest.mark.parametrize(
+    ("name", "fps"), [("v.mp4", 0), ("v.mp4", -1), ("v.mp4", float("nan")), ("v.mp4", 0.0004), ("v.mp4", 241), ("v.gif", 51)]
+)
 def test_impossible_rates_are_refused(tmp_path: Path, name: str, fps: float) -> None:
     with pytest.raises(InputError, match="frames per second"):
         check_video_target(tmp_path / name, fps)

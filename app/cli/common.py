@@ -16,8 +16,6 @@ from lfcore.errors import InputError
 if TYPE_CHECKING:
     from lfcore.lightfield import LightField
 
-_PICTURES = {".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".bmp"}
-
 Verbs = argparse._SubParsersAction  # argparse has no public name for it
 
 
@@ -122,17 +120,36 @@ def open_with_progress(path: Path, views: int = 8) -> LightField:
         return open_light_field(path, views=views, progress=bar.reach)
 
 
+def open_and_warn(path: Path, views: int = 8) -> LightField:
+    """As open_with_progress; what is to be minded about the light field goes to standard error."""
+    light_field = open_with_progress(path, views)
+    for warning in light_field.warnings:
+        print(f"Note: {path}: {warning}", file=sys.stderr)
+    return light_field
+
+
 def scenes_in(paths: list[Path]) -> list[Path]:
-    """The paths, each folder of folders replaced by the folders in it, sorted. Raises InputError for missing paths."""
+    """The paths, each folder of folders replaced by the folders in it, and another one of light fields by these, sorted.
+
+    Raises InputError for unreadable folders.
+    """
+    from lfcore.formats.collection import members
+    from lfcore.formats.images import EXTENSIONS
+
     scenes: list[Path] = []
     for path in paths:
-        if not path.exists():
-            raise InputError(f"{path} does not exist; give a light field, or a folder with one light field in each folder.")
         children = sorted(path.iterdir()) if path.is_dir() else []
         folders = [child for child in children if child.is_dir() and not child.name.startswith(".")]
-        holds_pictures = any(child.suffix.lower() in _PICTURES for child in children)
-        scenes += folders if folders and not holds_pictures else [path]
+        holds_pictures = any(child.suffix.lower() in EXTENSIONS for child in children)
+        scenes += folders if folders and not holds_pictures else sorted(members(path)) or [path]
     return scenes
+
+
+def check_all_there(paths: list[Path]) -> None:
+    """Raise InputError for the first path that is missing."""
+    for path in paths:
+        if not path.exists():
+            raise InputError(f"{path} does not exist; give a light field, or a folder of light fields.")
 
 
 def check_json_target(target: str | None) -> None:

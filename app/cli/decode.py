@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _targets(captures: list[Path], kind: str, options: argparse.Namespace) -> list[Path]:
     """Where each capture goes: a .png is an ESLF, anything else a folder of views. Raises LfviewError before any work."""
-    from lfcore.export import check_folder_target, check_target, make_folder
+    from lfcore.export import check_folder_target, check_no_views, check_target, make_folder
 
     if kind == "eslf" and options.views != 14:
         raise InputError(f"An ESLF holds 14 x 14 views, but --views is {options.views}; leave --views out, or add --as views.")
@@ -100,7 +100,11 @@ def _targets(captures: list[Path], kind: str, options: argparse.Namespace) -> li
     if twice is not None:
         raise InputError(f"Two captures are named {twice}; decode them into different folders.")
     folder = make_folder(options.out)
-    return [folder / (f"{name}.png" if kind == "eslf" else name) for name in names]
+    targets = [folder / (f"{name}.png" if kind == "eslf" else name) for name in names]
+    if kind != "eslf":
+        for target in targets:
+            check_no_views(target)
+    return targets
 
 
 def _jobs(captures: int) -> int:

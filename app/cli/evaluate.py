@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb, check_json_target, labelled, open_with_progress, scenes_in, write_json
+from app.cli.common import Verbs, add_verb, check_json_target, labelled, open_and_warn, scenes_in, write_json
 from app.progress import Progress
 from lfcore.errors import LfviewError
 
@@ -85,7 +85,7 @@ class _Findings:
     """What has been found so far: a dict by model for each scene that could be scored, a sentence for each other."""
 
     scores: list[dict[str, SceneScore]] = field(default_factory=list)
-    noises: list[SceneNoise] = field(default_factory=list)
+    noises: dict[int, SceneNoise] = field(default_factory=dict)  # by the scene's place in `scores`
     panels: list[ScenePanels] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
     figures: set[str] = field(default_factory=set)
@@ -127,7 +127,9 @@ def run(options: argparse.Namespace) -> int:
         from lfcore.report import Report, write_report
 
         command = shlex.join(["lfview", *sys.argv[1:]])
-        write_report(options.report, Report(evaluations, found.panels, found.noises, curves, found.failures, command))
+        write_report(
+            options.report, Report(evaluations, found.panels, list(found.noises.values()), curves, found.failures, command)
+        )
     if options.json != "-":
         _print_tables(evaluations, found, options.noise)
     return 2 if found.failures else 0
@@ -139,19 +141,17 @@ def _print_tables(evaluations: list[Evaluation], found: _Findings, noise: bool) 
 
     print(score_table(evaluations))
     if noise and found.noises:
-        print(f"\n{noise_table(found.noises)}")
+        print(f"\n{noise_table(list(found.noises.values()))}")
     elif noise:
         print("\nnoise: no view has flat regions large enough to measure it on")
 
 
-def _json_row(evaluation: Evaluation, noises: list[SceneNoise]) -> dict[str, Any]:
+def _json_row(evaluation: Evaluation, noises: dict[int, SceneNoise]) -> dict[str, Any]:
     from lfcore.noise import as_json
 
     row = evaluation.as_json()
-    by_name = {noise.name: noise for noise in noises}
-    for scene in row["scenes"]:
-        if scene["name"] in by_name:
-            scene["noise"] = as_json(by_name[scene["name"]], evaluation.model)
+    for number, noise in noises.items():
+        row["scenes"][number]["noise"] = as_json(noise, evaluation.model)
     return row
 
 
@@ -180,7 +180,7 @@ def _score_scene(
 ) -> None:
     from lfcore.evaluation import evaluate_scene, scene_noise, views_to_score
 
-    light_field = open_with_progress(path)
+    light_field = open_and_warn(path)
     count = len(views_to_score(light_field, protocol, options.grid))
     results: dict[str, SceneResult] = {}
     for label, synthesizer in models.items():
@@ -188,7 +188,7 @@ def _score_scene(
     if options.out is not None:
         _write_figures(options.out, light_field, results, protocol, found.figures)
     if options.noise and (noise := scene_noise(light_field, protocol, results)) is not None:
-        found.noises.append(noise)
+        found.noises[len(found.scores)] = noise
     if options.report:
         from lfcore.report_panels import scene_panels
 

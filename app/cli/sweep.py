@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_light_field, add_model, add_verb, count_or_none, open_with_progress, positive, viewpoint
+from app.cli.common import Verbs, add_light_field, add_model, add_verb, count_or_none, open_and_warn, positive, viewpoint
 from app.progress import Progress
 from lfcore.errors import InputError
 
@@ -111,7 +111,7 @@ def run(options: argparse.Namespace) -> int:
     from lfcore.synthesizer import make_synthesizer
 
     synthesizer = make_synthesizer(options.model)
-    light_field = open_with_progress(options.path, options.views)
+    light_field = open_and_warn(options.path, options.views)
     plan = _sized(plan, options, light_field)
     start = time.perf_counter()
     frames = SweepFrames(plan, light_field, remembering(light_field, synthesizer))

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_light_field, add_model, add_verb, count, open_with_progress, viewpoint
+from app.cli.common import Verbs, add_light_field, add_model, add_verb, count, open_and_warn, viewpoint
 from app.progress import Progress
 from lfcore.errors import InputError
 
@@ -102,7 +102,7 @@ def _one_view(options: argparse.Namespace) -> int:
     from lfcore.synthesizer import make_synthesizer
 
     synthesizer = make_synthesizer(options.model)
-    light_field = open_with_progress(options.path, options.views)
+    light_field = open_and_warn(options.path, options.views)
     with Progress("synthesizing", 1):
         synthesizer.set_light_field(light_field)
         synthesis = synthesizer.synthesize(u, v)
@@ -149,7 +149,7 @@ def _opened(options: argparse.Namespace) -> tuple[Synthesizer, LightField]:
     from lfcore.synthesizer import make_synthesizer
 
     synthesizer = make_synthesizer(options.model)
-    light_field = open_with_progress(options.path, options.views)
+    light_field = open_and_warn(options.path, options.views)
     synthesizer.set_light_field(light_field)
     return synthesizer, light_field
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb, count, open_with_progress, positive, scenes_in, share
+from app.cli.common import Verbs, add_verb, check_all_there, count, count_or_none, open_and_warn, positive, scenes_in, share
 from app.progress import Progress as Bar
 from app.progress import bar, clock
 from lfcore.errors import InputError
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from lfcore.training.loop import Progress, TrainConfig
     from lfcore.training.patches import TrainingScene
 
+_MOST_THREADS = 1024  # thousands of them end the program from within torch
 _FIRST_SCENE = 1000  # seed of the first generated scene: the same pool for every run
 _LINE_SECONDS = 60.0  # between two lines where the output is no terminal
 
@@ -76,14 +77,14 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "--balance", type=share, metavar="F", default=0.0, help="0: the paper's loss (default); to 1: dark patches weigh more"
     )
     parser.add_argument(
-        "--matching", type=int, metavar="N", default=1000, help="first steps that also match planes (default: 1000)"
+        "--matching", type=count_or_none, metavar="N", default=1000, help="first steps that also match planes (default: 1000)"
     )
     parser.add_argument(
         "--matching-weight", type=positive, metavar="W", default=0.03, help="how much that counts at first (default: 0.03)"
     )
     parser.add_argument(
         "--revival",
-        type=int,
+        type=count_or_none,
         metavar="N",
         default=500,
         help="steps after which dead channels get new weights, while the rate is high; 0: never, and idle ones of --init are "
@@ -91,7 +92,11 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     )
     parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
     parser.add_argument(
-        "--generated", type=int, metavar="N", default=0, help="generated scenes to train on beside the data (default: 0)"
+        "--generated",
+        type=count_or_none,
+        metavar="N",
+        default=0,
+        help="generated scenes to train on beside the data (0)",
     )
     parser.add_argument(
         "--generated-share", type=share, metavar="F", default=0.5, help="share of patches from generated scenes (0.5)"
@@ -107,7 +112,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         type=Path,
         help="weights to go on from, in place of random ones",
     )
-    parser.add_argument("--seed", type=int, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
+    parser.add_argument("--seed", type=count_or_none, metavar="N", default=1, help="seed of all that is drawn (default: 1)")
     parser.add_argument(
         "--run-dir",
         metavar="DIR",
@@ -125,6 +130,7 @@ def run(options: argparse.Namespace) -> int:
 
     out = check_target(options.out, (".safetensors",))
     run_dir = check_folder_target(options.run_dir or out.with_suffix(""))
+    check_all_there([*options.data, *options.val])
     data, held_out = scenes_in(options.data), scenes_in(options.val)
 
     import torch
@@ -137,6 +143,10 @@ def run(options: argparse.Namespace) -> int:
     config = _config(options)
     if options.device == "cuda" and not torch.cuda.is_available():
         raise InputError("There is no CUDA device that torch can use here; train with --device cpu or auto.")
+    if options.threads and options.threads > _MOST_THREADS:
+        raise InputError(
+            f"{options.threads} threads were asked for; give at most {_MOST_THREADS}, better as many as there are cores."
+        )
     if options.threads:
         torch.set_num_threads(options.threads)
     initial = load_weights(options.init) if options.init else None
@@ -216,7 +226,7 @@ def _generated(options: argparse.Namespace) -> list[TrainingScene]:
 
 def _open_all(paths: list[Path]) -> list[LightField]:
     """The light fields; one that is named twice is opened once, and drawn twice as often."""
-    opened = {path: open_with_progress(path) for path in dict.fromkeys(paths)}
+    opened = {path: open_and_warn(path) for path in dict.fromkeys(paths)}
     return [opened[path] for path in paths]
 
 

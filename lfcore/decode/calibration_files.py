@@ -31,6 +31,7 @@ class StoredBytes:
     offset: int
     size: int
     checksum: str | None = None
+    changed: int = 0  # when the file on disk was, in nanoseconds: without a checksum it tells whether these are the same bytes
 
     def read(self) -> bytes:
         """All bytes, checked where a checksum is known. Raises InputError where they are missing or differ."""
@@ -164,14 +165,18 @@ def _single(path: Path) -> CalibrationSet:
 
 
 def _plain_files(paths: Iterator[Path]) -> dict[str, StoredBytes]:
-    return {path.name.upper(): StoredBytes(str(path), path, 0, path.stat().st_size) for path in paths if path.is_file()}
+    found = ((path, path.stat()) for path in paths if path.is_file())
+    return {
+        path.name.upper(): StoredBytes(str(path), path, 0, facts.st_size, changed=facts.st_mtime_ns) for path, facts in found
+    }
 
 
 def _archive(path: Path) -> CalibrationSet:
     if not tar.is_tar(path):
         raise InputError(f"{path} is no calibration of a Lytro camera; expected a caldata-*.tar, a data.C.0 or a MOD_*.RAW.")
+    changed = path.stat().st_mtime_ns
     files = {
-        member.name.upper(): StoredBytes(f"{path}: {member.name}", path, member.offset, member.size)
+        member.name.upper(): StoredBytes(f"{path}: {member.name}", path, member.offset, member.size, changed=changed)
         for member in tar.members(path)
         if _WANTED.fullmatch(member.name.upper())
     }

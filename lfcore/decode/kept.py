@@ -22,6 +22,7 @@ from lfcore.lightfield import LightField
 
 DEFAULT_LIMIT = 2**30
 _FOLDER = "decoded"
+_DECODERS = "lfcore.decode", "lfcore.formats", "lfcore.formats.lytro"  # whose code decides what comes out
 _SUFFIX = ".lightfield"
 _MAGIC = b"lfview decoded 1\n"
 _HEADER_LIMIT = 2**20
@@ -99,7 +100,7 @@ def default_store() -> DecodedStore:
 
 def key_of(*parts: object) -> str:
     """A key for what was decoded from these parts (anything whose repr says all), by the code as it is."""
-    return hashlib.blake2b(repr((parts, code_digest("lfcore.decode"))).encode(), digest_size=16).hexdigest()
+    return hashlib.blake2b(repr((parts, code_digest(*_DECODERS))).encode(), digest_size=16).hexdigest()
 
 
 def _header(light_field: LightField) -> bytes:

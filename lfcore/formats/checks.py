@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lfcore.disparity_sign import DisparityCheck, Order, check_disparity
+from lfcore.disparity_sign import DisparityCheck, Order, baselines_differ, check_disparity
 from lfcore.formats.dark import find_dark_views
 from lfcore.formats.images import Pixels
 from lfcore.lightfield import LightField
@@ -23,13 +23,13 @@ def without_non_finite(view: Pixels) -> int:
     return count
 
 
-def warned_of_order(light_field: LightField) -> LightField:
-    """With a warning where rows and columns run against the pictures."""
+def with_warnings(light_field: LightField) -> LightField:
+    """With warnings: rows and columns run against the pictures, their baselines differ, values lie above white."""
     return _warned(light_field, check_disparity(light_field))
 
 
 def put_in_order(light_field: LightField) -> LightField:
-    """With its rows reversed, in place, where one axis runs against the pictures; else as warned_of_order.
+    """With its rows reversed, in place, where one axis runs against the pictures; else as with_warnings.
 
     For kinds of which either axis may run the other way; which of them does cannot be told from the pictures.
     """
@@ -42,7 +42,20 @@ def put_in_order(light_field: LightField) -> LightField:
 
 
 def _warned(light_field: LightField, check: DisparityCheck) -> LightField:
-    return replace(light_field, warnings=(*light_field.warnings, check.sentence)) if check.is_wrong else light_field
+    warnings = list(light_field.warnings)
+    if check.is_wrong:
+        warnings.append(check.sentence)
+    elif check.order is Order.UNKNOWN and baselines_differ(light_field):
+        grid = f"{light_field.rows} x {light_field.columns}"
+        warnings.append(
+            f"The views of this grid of {grid} lie equally far apart along rows and columns, so its two baselines differ, "
+            "which a synthesis takes as equal: open a square part of it, in a folder of its own."
+        )
+    views = light_field.views
+    if views.dtype.kind == "f" and (most := float(views.max())) > 1:
+        share = np.count_nonzero(np.greater(views, 1)) / views.size
+        warnings.append(f"{share:.1%} of the values lie above 1, up to {most:g}; 1 is white, which is what they are taken for.")
+    return replace(light_field, warnings=tuple(warnings))
 
 
 def _reverse_rows(views: Pixels) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from lfcore.errors import InputError
@@ -42,8 +42,8 @@ def members(folder: Path) -> tuple[Path, ...]:
         found = sorted((entry for entry in os.scandir(folder) if not entry.name.startswith(".")), key=_by_name)
     except OSError as error:
         raise InputError(f"{folder} cannot be read: {error.strerror}; check its permissions.") from error
-    files = [Path(entry.path) for entry in found if entry.is_file()]
-    folders = [Path(entry.path) for entry in found if entry.is_dir()]
+    files = [Path(entry.path) for entry in found if _is(entry.is_file)]
+    folders = [Path(entry.path) for entry in found if _is(entry.is_dir)]
     pictures = [file for file in files if file.suffix.lower() in EXTENSIONS]
     containers = [file for file in files if file.suffix.lower() in CONTAINERS]
     inner = [each for each in folders if holds_something(each)]
@@ -93,6 +93,14 @@ def _is_eslf(picture: Path) -> bool:
         return False
 
 
+def _is(kind: Callable[[], bool]) -> bool:
+    """Whether an entry is of that kind; a link that leads to itself is of none."""
+    try:
+        return kind()
+    except OSError:
+        return False
+
+
 def _holds(folder: Path, endings: tuple[str, ...]) -> bool:
     with contextlib.suppress(OSError), os.scandir(folder) as found:
         return any(entry.name.lower().endswith(endings) and not entry.name.startswith(".") for entry in found)
@@ -101,7 +109,7 @@ def _holds(folder: Path, endings: tuple[str, ...]) -> bool:
 
 def _folders(folder: Path) -> Iterator[Path]:
     with contextlib.suppress(OSError), os.scandir(folder) as found:
-        yield from (Path(entry.path) for entry in found if entry.is_dir() and not entry.name.startswith("."))
+        yield from (Path(entry.path) for entry in found if _is(entry.is_dir) and not entry.name.startswith("."))
 
 
 def _by_name(entry: os.DirEntry[str]) -> tuple[list[tuple[int, str]], str]:

@@ -59,6 +59,8 @@ def _disparity(light_field: LightField, check: DisparityCheck) -> str:
     if check.order is Order.UNKNOWN:
         return "not found"
     text = f"{check.low:.1f} to {check.high:.1f} px corner to corner"
+    if max(abs(check.low), abs(check.high)) > _SWEEP_LIMIT:
+        text += ", in the middle of the picture,"
     steps = light_field.columns - 1
     if steps > 1:
         text += f" ({check.low / steps:.2f} to {check.high / steps:.2f} px between neighbouring views)"

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lfcore.errors import Cancelled, InputError
-from lfcore.formats.checks import put_in_order, warned_of_order, without_non_finite
+from lfcore.formats.checks import put_in_order, with_warnings, without_non_finite
 from lfcore.formats.dark import find_dark_views
 from lfcore.formats.images import EXTENSIONS, Header, Pixels, check_memory, open_picture, read_header
 from lfcore.formats.names import GANTRY, RULES, Grid, belongs_to_grid, find_grid
@@ -67,7 +67,7 @@ def read(
         dark=find_dark_views(views),
     )
     # A gantry's columns are in the order of the camera's x, so where one axis is reversed it must be the rows.
-    return put_in_order(light_field) if grid.kind == GANTRY else warned_of_order(light_field)
+    return put_in_order(light_field) if grid.kind == GANTRY else with_warnings(light_field)
 
 
 def grid_of(path: Path) -> Grid:

@@ -287,7 +287,10 @@ class Trainer:
             decay = min(self._config.average, (1 + self.step) / (10 + self.step))
             for mean, value in zip(self._average.parameters(), self._model.parameters(), strict=True):
                 mean.lerp_(value, 1 - decay)
-        return float(squared_error)
+        error = float(squared_error)
+        if not math.isfinite(error):
+            raise InputError(f"The training has diverged at step {self.step} (its loss is {error}); lower the learning rate.")
+        return error
 
     def validate(self, light_fields: Sequence[LightField], loss: float) -> CurvePoint:
         """K16 of the averaged weights on each held-out light field, by the synthesizer that users get."""
