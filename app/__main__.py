@@ -22,6 +22,7 @@ from typing import NoReturn
 
 from app.cli import bench, cache, decode, evaluate, generate, info, sweep, synth, train, view
 from lfcore.errors import LfviewError
+from lfcore.patience import wait_shortly
 
 VERBS = {
     "view": view,
@@ -50,10 +51,6 @@ _EXAMPLES = """examples:
   lfview cache --clear
 `lfview VERB --help` tells more."""
 
-
-# How often a thread of torch looks for more work before it sleeps, a few tens of microseconds. Ten times as often, as libgomp
-# does else, is no faster where cores are free, and takes two to four times as long where other programs want them too.
-_SPINS = "30000"
 
 _WITH_PAIRS = ("--uv", "--from", "--to", "--focus")
 
@@ -88,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_normalised(given))
     except SystemExit as stop:  # argparse's way out after --help or a complaint
         return stop.code if isinstance(stop.code, int) else 2
-    os.environ.setdefault("GOMP_SPINCOUNT", _SPINS)
+    wait_shortly()
     try:
         status: int = options.run(options)
         sys.stdout.flush()

@@ -16,6 +16,7 @@ import numpy as np
 
 from lfcore.errors import Cancelled, LfviewError
 from lfcore.lightfield import LightField
+from lfcore.patience import wait_shortly
 from lfcore.remote_messages import (
     Cancel,
     Exchange,
@@ -49,10 +50,7 @@ def serve(connection: Connection, make: MakeSynthesizer, niceness: int) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _stand_back(niceness // 2)
-    # Threads of the networks that wait for each other spin for a microsecond or two, then sleep: longer spinning would keep the
-    # frame loop, and each other, from the cores (docs/speed.md). Read when torch is loaded.
-    if "OMP_WAIT_POLICY" not in os.environ:
-        os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+    wait_shortly()  # before torch is loaded
     if make is shipped_models:
         import torch  # noqa: F401  # now, while the program opens its window and its file
     server = _Server(connection, make)
