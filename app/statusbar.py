@@ -39,7 +39,7 @@ def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float) -> None:
         if readout.grid is None and not readout.captions:
             text(_idle_words(readout), theme.TEXT_SOFT)
             return
-        left = _exhibit(state, readout, pad, y) if readout.captions else _step(state, readout, pad, y)
+        left = _exhibit(state, readout, pad, y) if readout.captions else _step(readout, pad, y)
         gap = em() * 1.6
         for part in reversed(_right_parts(state, readout, zoom)):
             width = imgui.calc_text_size(part.words).x
@@ -60,7 +60,7 @@ def _idle_words(readout: Readout) -> str:
     return "Opening" if readout.loading is not None else "Nothing is open"
 
 
-def _step(state: ViewState, readout: Readout, x: float, y: float) -> float:
+def _step(readout: Readout, x: float, y: float) -> float:
     """The step on screen with its dot; returns where it ends."""
     step = readout.step
     words = step.value

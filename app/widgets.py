@@ -252,6 +252,20 @@ def packed(colour: ImVec4) -> int:
     return imgui.get_color_u32(colour)
 
 
+def ticks(low: float, high: float, decimals: int = 2) -> tuple[str, str, str]:
+    """What stands at both ends of a scale and in its middle."""
+    return number(low, decimals), number((low + high) / 2, decimals), number(high, decimals)
+
+
+def bring_into_sight(y: float, height: float) -> None:
+    """Scroll the window only as far as it takes to see what lies there."""
+    top, room = imgui.get_scroll_y(), imgui.get_window_height()
+    if y < top:
+        imgui.set_scroll_y(y)
+    elif y + height > top + room:
+        imgui.set_scroll_y(y + height - room)
+
+
 TAG_GAP = "   "  # between a tag's name and what is left out first where there is no room
 
 

@@ -14,14 +14,10 @@ from lfcore.lightfield import FloatArray
 from lfcore.sweep_frames import SweepFrames
 from lfcore.sweep_plan import Layer, SweepPlan
 from lfcore.sweep_target import Kind, Target, check_fits
+from lfcore.synthesis import never
 from lfcore.video import VIDEO_EXTENSIONS, check_video_target, write_video
 
 _T = TypeVar("_T")
-
-
-def never() -> bool:
-    """Is not cancelled."""
-    return False
 
 
 def check_target(plan: SweepPlan, target: Target) -> None:

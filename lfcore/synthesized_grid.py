@@ -17,16 +17,12 @@ from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import to_uint8
 from lfcore.quilt import MAX_VIEWS, Quilt, quilt_path
 from lfcore.refocus import shifted
+from lfcore.synthesis import never
 
 ByteArray = npt.NDArray[np.uint8]
 View = Callable[[float, float], FloatArray]
 
 MAX_QUILT_SIDE = 32_768  # px
-
-
-def never() -> bool:
-    """Is not cancelled."""
-    return False
 
 
 def check_grid_target(path: str | os.PathLike[str], side: int, light_field: LightField) -> Path:

@@ -75,7 +75,7 @@ class Slices:
         else:
             framebuffer.scissor = (start, height - picture.y - picture.height, end - start, picture.height)
         framebuffer.use()
-        sampled, uniforms = self._source(slicing, axis)
+        sampled, uniforms = self._source(slicing)
         source = "slice_captured.glsl" if slicing.captured else "slice_carried.glsl"
         self._passes.toned("slice.frag", tone, slice_source=source).render(
             sampled,
@@ -93,7 +93,7 @@ class Slices:
         )
         framebuffer.scissor = (0, 0, width, height)
 
-    def _source(self, slicing: Slicing, axis: Point) -> tuple[dict[str, AnyTexture], dict[str, Uniform]]:
+    def _source(self, slicing: Slicing) -> tuple[dict[str, AnyTexture], dict[str, Uniform]]:
         textures = self._textures
         if not slicing.captured:
             uniforms = {**carrying(textures, slicing.viewpoint, farthest=math.inf), "newest": textures.newest}

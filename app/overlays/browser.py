@@ -9,7 +9,7 @@ from app.commands import Browse, Context, OpenPath
 from app.desk import Card, Folder, Shelf
 from app.geometry import Rect
 from app.overlays import tiles
-from app.widgets import BARE, button, elided, em, font, text, tooltip
+from app.widgets import BARE, bring_into_sight, button, elided, em, font, text, tooltip
 
 _AHEAD = 3  # rows of tiles beyond those in sight that are looked at too
 
@@ -76,7 +76,7 @@ def _tiles(folder: Folder, context: Context, shelf: Shelf) -> None:
     moved = _moved(columns, imgui.get_window_height() // (one.y + gap), len(members))
     desk.chosen = min(max(desk.chosen + moved, 0), len(members) - 1)
     if moved:
-        _bring_into_sight(desk.chosen // columns * (one.y + gap), one.y)
+        bring_into_sight(desk.chosen // columns * (one.y + gap), one.y)
     first = max(int(imgui.get_scroll_y() // (one.y + gap)), 0)
     last = min(int((imgui.get_scroll_y() + imgui.get_window_height()) // (one.y + gap)), rows - 1)
     start = imgui.get_cursor_pos()
@@ -109,11 +109,3 @@ def _moved(columns: int, rows_in_sight: float, count: int) -> int:
     page = columns * max(int(rows_in_sight), 1)
     steps += page * (int(pressed(imgui.Key.page_down)) - int(pressed(imgui.Key.page_up)))
     return steps + count * (int(pressed(imgui.Key.end)) - int(pressed(imgui.Key.home)))
-
-
-def _bring_into_sight(y: float, height: float) -> None:
-    top, room = imgui.get_scroll_y(), imgui.get_window_height()
-    if y < top:
-        imgui.set_scroll_y(y)
-    elif y + height > top + room:
-        imgui.set_scroll_y(y + height - room)

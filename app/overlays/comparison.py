@@ -13,7 +13,7 @@ from app.geometry import Rect, Size
 from app.panes import Pane, handle
 from app.readout import Readout, ScoreText
 from app.state import Look, Step, ViewState
-from app.widgets import FIXED, TAG_GAP, decibels, em, fitting_tag, number, packed, tag, tooltip, window
+from app.widgets import FIXED, TAG_GAP, decibels, em, fitting_tag, number, packed, tag, ticks, tooltip, window
 from lfcore import colormaps
 
 _STEPS = 32
@@ -131,20 +131,16 @@ def difference_scale(state: ViewState) -> Scale:
     difference, top = state.comparison.difference, 1 / state.gain
     black, grey, white = (theme.colour(code) for code in (0x000000, 0x808080, 0xFFFFFF))
     if difference is Difference.SIGNED:
-        return (black, grey, white), [("of white", _ticks(-top, top, 3)), ("of 255", _ticks(-255 * top, 255 * top, 1))]
+        return (black, grey, white), [("of white", ticks(-top, top, 3)), ("of 255", ticks(-255 * top, 255 * top, 1))]
     if difference is Difference.SQUARED:
         roots = (number(0, 1), number(255 * top * 0.5**0.5, 1), number(255 * top, 1))
-        return (black, white), [("of white, squared", _ticks(0, top**2, 5)), ("of 255, the root", roots)]
+        return (black, white), [("of white, squared", ticks(0, top**2, 5)), ("of 255, the root", roots)]
     if difference is Difference.SIMILARITY:
-        return _error_stops(), [("SSIM", _ticks(1, 1 - top, 3))]
+        return _error_stops(), [("SSIM", ticks(1, 1 - top, 3))]
     if difference is Difference.BLOCKS:
-        return _error_stops(), [("dB in 16 × 16 px", _ticks(*BLOCK_RANGE, 0))]
-    rows = [("of white", _ticks(0, top, 3)), ("of 255", _ticks(0, 255 * top, 1))]
+        return _error_stops(), [("dB in 16 × 16 px", ticks(*BLOCK_RANGE, 0))]
+    rows = [("of white", ticks(0, top, 3)), ("of 255", ticks(0, 255 * top, 1))]
     return (_error_stops(), rows) if difference is Difference.FALSE_COLOUR else ((black, white), rows)
-
-
-def _ticks(low: float, high: float, decimals: int) -> tuple[str, str, str]:
-    return number(low, decimals), number((low + high) / 2, decimals), number(high, decimals)
 
 
 @functools.cache

@@ -44,7 +44,7 @@ def inspector(area: Rect, state: ViewState, readout: Readout) -> None:
         error = samples.error(part)
         _row("Error", DASH if error is None else f"{_row_of(255 * error[0, 0], 1)}  of 255")
         if state.look in _DETAILS:
-            _row(_DETAILS[state.look], _detail(samples, part, state, readout))
+            _row(_DETAILS[state.look], _detail(samples, part, state))
 
 
 _DETAILS = {
@@ -77,7 +77,7 @@ def _disparity(samples: Samples, part: Part, readout: Readout) -> str:
     return f"{number(value, 2)} px,  {number(value / (readout.grid.columns - 1), 3)} per view"
 
 
-def _detail(samples: Samples, part: Part, state: ViewState, readout: Readout) -> str:
+def _detail(samples: Samples, part: Part, state: ViewState) -> str:
     if state.look is Look.LEAN and samples.disparity is not None:
         shares = samples.shares(part)[0, 0]
         most = int(shares.argmax())

@@ -63,7 +63,7 @@ def missing(area: Rect, context: Context, readout: Readout) -> None:
     """Why the chosen look has nothing to show, and what to do."""
     look = context.state.look
     if look is Look.ERROR and not readout.compared.there:
-        _no_partner(area, context, readout)
+        _no_partner(area, context)
     elif look is Look.ERROR and context.state.comparison.difference.measured and not readout.compared.mapped:
         with card("missing", area, (0.5, 0.5), 24 * em(), PASSIVE):
             wrapped("Computing the map" if readout.step is Step.FULL else "The map is computed when the picture is finished")
@@ -74,7 +74,7 @@ def missing(area: Rect, context: Context, readout: Readout) -> None:
             wrapped(why, theme.TEXT_SOFT)
 
 
-def _no_partner(area: Rect, context: Context, readout: Readout) -> None:
+def _no_partner(area: Rect, context: Context) -> None:
     """Why there is no difference to see."""
     partner = context.state.comparison.partner
     if partner == CAPTURED_VIEW:

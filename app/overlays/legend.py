@@ -13,7 +13,7 @@ from app.looking import CORNER_COLOURS
 from app.overlays.comparison import difference_scale
 from app.readout import Readout
 from app.state import Look, ViewState
-from app.widgets import PASSIVE, card, em, number, packed, text, wrapped
+from app.widgets import PASSIVE, card, em, number, packed, text, ticks, wrapped
 from lfcore import colormaps
 from lfcore.colormaps import ColourMap
 from lfcore.lightfield import CORNERS
@@ -32,11 +32,11 @@ def legend(area: Rect, state: ViewState, readout: Readout) -> None:
     if readout.captions:
         caption = readout.captions[state.exhibit]
         if caption.span is not None:
-            _scale(area, colours, [(caption.unit, _ticks(*caption.span))])
+            _scale(area, colours, [(caption.unit, ticks(*caption.span))])
     elif state.look is Look.DISPARITY and readout.disparity_range is not None and readout.grid is not None:
         low, high = readout.disparity_range
         views = readout.grid.columns - 1
-        rows = [("px over the baseline", _ticks(low, high)), ("px per captured view", _ticks(low / views, high / views))]
+        rows = [("px over the baseline", ticks(low, high)), ("px per captured view", ticks(low / views, high / views))]
         _scale(area, colours, rows)
     elif state.look is Look.ERROR and readout.compared.there:
         _scale(area, *difference_scale(state))
@@ -56,11 +56,7 @@ def _at_level(state: ViewState) -> str:
 
 def _of_white(gain: float) -> list[Row]:
     top = 1 / gain
-    return [("of white", _ticks(0, top, 3)), ("of 255", _ticks(0, 255 * top, 1))]
-
-
-def _ticks(low: float, high: float, decimals: int = 2) -> tuple[str, str, str]:
-    return number(low, decimals), number((low + high) / 2, decimals), number(high, decimals)
+    return [("of white", ticks(0, top, 3)), ("of 255", ticks(0, 255 * top, 1))]
 
 
 def _note(area: Rect, words: str) -> None:

@@ -8,7 +8,7 @@ from app import commands, theme
 from app.commands import COMMANDS, Command, Context
 from app.desk import Card
 from app.geometry import Rect
-from app.widgets import card, elided, em, packed, text
+from app.widgets import bring_into_sight, card, elided, em, packed, text
 
 _ROWS = 12
 
@@ -78,7 +78,7 @@ def _list(found: list[str], rows: int, chosen: int, moved: bool) -> str | None:
     clipper = imgui.ListClipper()
     clipper.begin(len(found), height)
     if moved:
-        _scroll_to(chosen * height, height)
+        bring_into_sight(chosen * height, height)
     while clipper.step():
         for index in range(clipper.display_start, clipper.display_end):
             if _row(found[index], index == chosen):
@@ -86,15 +86,6 @@ def _list(found: list[str], rows: int, chosen: int, moved: bool) -> str | None:
     imgui.end_child()
     imgui.pop_style_var()
     return clicked
-
-
-def _scroll_to(y: float, height: float) -> None:
-    """Scroll only as far as it takes to see the row."""
-    top, room = imgui.get_scroll_y(), imgui.get_window_height()
-    if y < top:
-        imgui.set_scroll_y(y)
-    elif y + height > top + room:
-        imgui.set_scroll_y(y + height - room)
 
 
 def _row(name: str, chosen: bool) -> bool:

@@ -33,10 +33,6 @@ _CLASSES = {"single": "float32", "double": "float64"} | {
 Progress = Callable[[float], None]
 
 
-def _never() -> bool:
-    return False
-
-
 @dataclass(frozen=True)
 class StoredArray(ABC):
     """An array in a file; its axes are those of the program that wrote it, in their order."""
@@ -53,7 +49,7 @@ class StoredArray(ABC):
 
     @abstractmethod
     def read(
-        self, places: Mapping[int, int], progress: Progress | None = None, cancelled: Callable[[], bool] = _never
+        self, places: Mapping[int, int], progress: Progress | None = None, cancelled: Callable[[], bool] = lambda: False
     ) -> Pixels:
         """What lies at these places of these axes, which keep a length of 1; all of it, where there are none.
 
@@ -108,7 +104,7 @@ class _MatlabArray(StoredArray):
     """Of a file before MATLAB 7.3, which is read as a whole."""
 
     def read(
-        self, places: Mapping[int, int], progress: Progress | None = None, cancelled: Callable[[], bool] = _never
+        self, places: Mapping[int, int], progress: Progress | None = None, cancelled: Callable[[], bool] = lambda: False
     ) -> Pixels:
         from scipy.io import loadmat
 
@@ -138,7 +134,7 @@ class _HDF5Array(StoredArray):
     backwards: bool
 
     def read(
-        self, places: Mapping[int, int], progress: Progress | None = None, cancelled: Callable[[], bool] = _never
+        self, places: Mapping[int, int], progress: Progress | None = None, cancelled: Callable[[], bool] = lambda: False
     ) -> Pixels:
         import h5py
 

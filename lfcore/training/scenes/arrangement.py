@@ -73,7 +73,7 @@ def arrange(
     grids = _draw_surfaces(canvas, drawn, config, high - low, rng)
     grids = _stretch(canvas, drawn, grids, low, high)
     pictures = [material.draw(canvas.full, rng) * shape.shade.unsqueeze(-1) for shape in drawn]
-    pictures = _light(pictures, drawn, rng)
+    pictures = _light(pictures, rng)
     if rng.random() < config.shadow_share:
         pictures = _cast_shadows(canvas, pictures, drawn, grids, rng)
     blurs = _draw_blurs(canvas, drawn, grids, config, softness, rng)
@@ -181,7 +181,7 @@ def _stretch(canvas: Canvas, drawn: list[Shape], grids: list[Tensor], low: float
     return [((grid - least) * scale + low).clamp(low, high) for grid in grids]
 
 
-def _light(pictures: list[Tensor], drawn: list[Shape], rng: np.random.Generator) -> list[Tensor]:
+def _light(pictures: list[Tensor], rng: np.random.Generator) -> list[Tensor]:
     """Bring the textures to one light: each of a brightness of its own about the scene's, all of one tint."""
     tint = torch.from_numpy(np.exp(rng.normal(0, 0.12, 3)).astype(np.float32))
     spread = rng.uniform(0.2, 0.8)
