@@ -86,6 +86,7 @@ def test_options_make_a_plan_and_stand_over_that_of_a_file(scene: Path, tmp_path
         (["--focus", "nan"], "focus"),
         (["--layer", "depth"], "no layer 'depth'"),
         (["--scale", "2", "--width", "30"], "not allowed with"),
+        (["--width", "1"], "--width is 1 px"),
         (["--plays", "2"], "--plays is for .webp and .gif"),
         (["--as", "exr", "--labels"], "leave out labels"),
         (["--layer", "disparity"], "mean has no disparity"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -182,4 +183,11 @@ def _target(options: argparse.Namespace) -> Target:
 
 
 def _sized(plan: SweepPlan, options: argparse.Namespace, light_field: LightField) -> SweepPlan:
-    return plan if options.width is None else replace(plan, scale=options.width / light_field.width)
+    from lfcore.sweep_plan import SCALE_LIMITS
+
+    if options.width is None:
+        return plan
+    least, most = math.ceil(SCALE_LIMITS[0] * light_field.width), math.floor(SCALE_LIMITS[1] * light_field.width)
+    if not least <= options.width <= most:
+        raise InputError(f"--width is {options.width:g} px; for views of {light_field.width} px give {least} to {most}.")
+    return replace(plan, scale=options.width / light_field.width)
