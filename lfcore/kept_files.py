@@ -6,14 +6,17 @@ import contextlib
 import hashlib
 import os
 import sys
+import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from typing import ClassVar
 
 from lfcore.errors import OutputError
 
+LEFTOVER_SECONDS = 3600.0  # temporary files this old were left by a program that was killed
 _CODE = (".py", ".c", ".h", ".so", ".pyd")  # what was compiled stands for C where that is not installed
 
 
@@ -67,6 +70,46 @@ def make_room(files: Iterable[KeptFile], wanted: int, limit: int) -> None:
             return
         remove(file.path)
         excess -= file.size
+
+
+@dataclass(frozen=True)
+class FileStore:
+    """Files of one kind in a folder that is made when first written to, at most `limit_bytes` of them, found by a key."""
+
+    folder: Path
+    limit_bytes: int
+    suffix: ClassVar[str]
+
+    def usage(self) -> tuple[int, int]:
+        """(files, bytes) that are kept."""
+        files = self._files()
+        return len(files), sum(file.size for file in files)
+
+    def clear(self) -> None:
+        """Remove all of them, but not what another program is just writing."""
+        for file in self._files():
+            if not _is_being_written(file):
+                remove(file.path)
+
+    def room_for(self, key: str, size: int) -> Path:
+        """Where to write the file under this key, once those used longest ago have made room for it. Raises OutputError."""
+        for file in self._files():
+            if file.path.name.startswith(".") and not _is_being_written(file):
+                remove(file.path)  # begun by a program that did not end it
+        make_room(self._files(), size, self.limit_bytes)
+        make_private(self.folder)
+        return self.path(key)
+
+    def path(self, key: str) -> Path:
+        """The file under this key, be it there or not."""
+        return self.folder / f"{key}{self.suffix}"
+
+    def _files(self) -> list[KeptFile]:
+        return [file for file in entries(self.folder) if file.path.name.endswith(self.suffix)]
+
+
+def _is_being_written(file: KeptFile) -> bool:
+    return file.path.name.startswith(".") and time.time() - file.used_at < LEFTOVER_SECONDS
 
 
 def mark_used(path: Path) -> None:

@@ -21,12 +21,11 @@ import numpy as np
 from lfcore.atomic import atomic_path
 from lfcore.cache import CacheKey
 from lfcore.errors import OutputError
-from lfcore.kept_files import KeptFile, code_digest, entries, make_room, mark_used, remove
+from lfcore.kept_files import LEFTOVER_SECONDS, KeptFile, code_digest, entries, make_room, mark_used, remove
 from lfcore.synthesis import Synthesis
 
 DEFAULT_LIMIT = 2**30
 UNUSED_DAYS = 60.0  # views not looked at for so long are removed
-_LEFTOVER_SECONDS = 3600.0  # temporary files this old were left by a program that was killed
 _MAGIC = b"lfview view 1\n"
 _HEADER_LIMIT = 4096
 _DIGEST_BYTES = 16
@@ -108,7 +107,7 @@ class ViewStore:
         now = time.time()
         for folder in self._folders():
             for entry in entries(folder):
-                age = UNUSED_DAYS * _DAY if entry.path.suffix == _SUFFIX and entry.path.name[0] != "." else _LEFTOVER_SECONDS
+                age = UNUSED_DAYS * _DAY if entry.path.suffix == _SUFFIX and entry.path.name[0] != "." else LEFTOVER_SECONDS
                 if now - entry.used_at > age:
                     remove(entry.path)
             with contextlib.suppress(OSError):

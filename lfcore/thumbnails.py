@@ -12,17 +12,17 @@ import os
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 from lfcore.atomic import atomic_path
 from lfcore.errors import InputError
 from lfcore.formats.glance import LONGEST_SIDE, Glance
-from lfcore.kept_files import KeptFile, code_digest, default_root, entries, make_private, make_room, mark_used, remove
+from lfcore.kept_files import FileStore, code_digest, default_root, entries, mark_used, remove
 
 DEFAULT_LIMIT = 64 * 2**20
 _FOLDER = "thumbnails"
-_SUFFIX = ".thumbnail"
 _MAGIC = b"lfview thumbnail 1\n"
 _LARGEST = 2**20
 _DIGEST_BYTES = 16
@@ -31,15 +31,15 @@ _LOOKERS = ("lfcore.formats", "lfcore.formats.lytro", "lfcore.decode")
 
 
 @dataclass(frozen=True)
-class ThumbnailStore:
-    """Glances under `folder` (made when first written to), at most `limit_bytes` of them."""
+class ThumbnailStore(FileStore):
+    """Glances."""
 
-    folder: Path
     limit_bytes: int = DEFAULT_LIMIT
+    suffix: ClassVar[str] = ".thumbnail"
 
     def get(self, key: str) -> Glance | None:
         """The glance under this key; None where there is none, or a damaged one, which is removed."""
-        path = self._path(key)
+        path = self.path(key)
         try:
             with path.open("rb") as file:
                 seen = _unpacked(file.read(_LARGEST + 1))
@@ -54,26 +54,8 @@ class ThumbnailStore:
     def put(self, key: str, seen: Glance) -> None:
         """Keep this glance, and remove those used longest ago where there would be too many. Raises OutputError."""
         data = _packed(seen)
-        make_room(self._files(), len(data), self.limit_bytes)
-        make_private(self.folder)
-        with atomic_path(self._path(key)) as temporary:
+        with atomic_path(self.room_for(key, len(data))) as temporary:
             temporary.write_bytes(data)
-
-    def usage(self) -> tuple[int, int]:
-        """(thumbnails, bytes) that are kept."""
-        files = self._files()
-        return len(files), sum(file.size for file in files)
-
-    def clear(self) -> None:
-        """Remove all of them."""
-        for file in self._files():
-            remove(file.path)
-
-    def _files(self) -> list[KeptFile]:
-        return [file for file in entries(self.folder) if file.path.name.endswith(_SUFFIX)]
-
-    def _path(self, key: str) -> Path:
-        return self.folder / f"{key}{_SUFFIX}"
 
 
 def default_store() -> ThumbnailStore:
@@ -87,8 +69,7 @@ def key_of(path: Path) -> str:
     Raises InputError where it cannot be looked at.
     """
     digest = hashlib.blake2b(os.fsencode(path.absolute()), digest_size=16)
-    for package in _LOOKERS:
-        digest.update(code_digest(package).encode())
+    digest.update(code_digest(*_LOOKERS).encode())
     try:
         facts = path.stat()
         digest.update(repr((facts.st_size, facts.st_mtime_ns)).encode())

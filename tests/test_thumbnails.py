@@ -94,3 +94,16 @@ def test_another_place_size_time_or_view_is_another_key(tmp_path: Path) -> None:
     assert key_of(folder) == keys[-2]
     with pytest.raises(InputError, match="cannot be opened"):
         key_of(tmp_path / "gone")
+
+
+def test_what_another_program_is_writing_is_left_alone_and_what_it_left_behind_is_not(tmp_path: Path) -> None:
+    store = ThumbnailStore(tmp_path)
+    store.put("a", Glance(None, "a"))
+    young, old = tmp_path / ".b.1234.thumbnail", tmp_path / ".c.1234.thumbnail"
+    for begun in (young, old):
+        begun.write_bytes(b"half of")
+    os.utime(old, (1, 1))
+    store.put("d", Glance(None, "d"))
+    assert sorted(tmp_path.iterdir()) == [young, store.path("a"), store.path("d")]
+    store.clear()
+    assert list(tmp_path.iterdir()) == [young]

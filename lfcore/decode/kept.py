@@ -8,38 +8,34 @@ from __future__ import annotations
 
 import hashlib
 import json
-import time
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from lfcore.atomic import atomic_path
-from lfcore.kept_files import KeptFile, code_digest, default_root, entries, make_private, make_room, mark_used, remove
+from lfcore.kept_files import FileStore, code_digest, default_root, mark_used, remove
 from lfcore.lightfield import LightField
 
 DEFAULT_LIMIT = 2**30
 _FOLDER = "decoded"
 _DECODERS = "lfcore.decode", "lfcore.formats", "lfcore.formats.lytro"  # whose code decides what comes out
-_SUFFIX = ".lightfield"
 _MAGIC = b"lfview decoded 1\n"
 _HEADER_LIMIT = 2**20
 _DIGEST_BYTES = 16
-_LEFTOVER_SECONDS = 3600.0  # temporary files this old were left by a program that was killed
 
 
 @dataclass(frozen=True)
-class DecodedStore:
-    """Light fields under `folder` (made when first written to), at most `limit_bytes` of them."""
+class DecodedStore(FileStore):
+    """Light fields."""
 
-    folder: Path
     limit_bytes: int = DEFAULT_LIMIT
+    suffix: ClassVar[str] = ".lightfield"
 
     def get(self, key: str) -> LightField | None:
         """The light field under this key; None where there is none, or a damaged one, which is removed."""
-        path = self._path(key)
+        path = self.path(key)
         try:
             with path.open("rb") as file:
                 light_field = _read(file.read(len(_MAGIC) + 4), file, path.stat().st_size)
@@ -53,7 +49,7 @@ class DecodedStore:
 
     def holds(self, key: str) -> bool:
         """Whether there is a light field under this key, be it damaged."""
-        return self._path(key).is_file()
+        return self.path(key).is_file()
 
     def put(self, key: str, light_field: LightField) -> None:
         """Keep this light field, and remove those used longest ago where there would be too many. Raises OutputError."""
@@ -61,36 +57,12 @@ class DecodedStore:
         size = len(_MAGIC) + 4 + len(header) + light_field.views.nbytes + _DIGEST_BYTES
         if size > self.limit_bytes:
             return
-        self._make_room(size)
-        make_private(self.folder)
-        with atomic_path(self._path(key)) as temporary, temporary.open("wb") as file:
+        with atomic_path(self.room_for(key, size)) as temporary, temporary.open("wb") as file:
             start = _MAGIC + len(header).to_bytes(4, "little") + header
             views = np.ascontiguousarray(light_field.views)
             file.write(start)
             file.write(views.data)
             file.write(_digest(start, views))
-
-    def usage(self) -> tuple[int, int]:
-        """(light fields, bytes) that are kept."""
-        files = self._files()
-        return len(files), sum(file.size for file in files)
-
-    def clear(self) -> None:
-        """Remove all of them."""
-        for file in self._files():
-            remove(file.path)
-
-    def _make_room(self, wanted: int) -> None:
-        for file in self._files():
-            if file.path.name.startswith(".") and time.time() - file.used_at > _LEFTOVER_SECONDS:
-                remove(file.path)  # begun by a program that did not end it
-        make_room(self._files(), wanted, self.limit_bytes)
-
-    def _files(self) -> list[KeptFile]:
-        return [file for file in entries(self.folder) if file.path.name.endswith(_SUFFIX)]
-
-    def _path(self, key: str) -> Path:
-        return self.folder / f"{key}{_SUFFIX}"
 
 
 def default_store() -> DecodedStore:
