@@ -34,7 +34,21 @@ if TYPE_CHECKING:  # the readers of files are loaded when they are needed
 
 SAVE_SECONDS = 3.0  # after a change, settings are written
 STOP_SECONDS = 3.0
-PATTERNS = ("*.lfp", "*.LFP", "*.lfr", "*.LFR", "*.png", "*.webp", "*.jpg", "*.jpeg", "*.tif", "*.tiff", "*.exr")
+PATTERNS = (
+    "*.lfp",
+    "*.LFP",
+    "*.lfr",
+    "*.LFR",
+    "*.png",
+    "*.webp",
+    "*.jpg",
+    "*.jpeg",
+    "*.tif",
+    "*.tiff",
+    "*.exr",
+    "*.mat",
+    "*.h5",
+)
 
 
 @dataclass(frozen=True)
