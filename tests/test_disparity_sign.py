@@ -137,7 +137,7 @@ def test_real_light_fields_are_judged_right_in_every_order(scene: Path) -> None:
         assert check.order is expected, name
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(3, 5), (9, 3), (2, 4), (5, 9)])
+@pytest.mark.parametrize(("rows", "columns"), [(3, 5), (9, 3), (2, 4)])
 @pytest.mark.parametrize("disparity", [-12.0, 6.0])
 def test_of_other_grids_than_square_ones_the_baselines_count_as_equal(rows: int, columns: int, disparity: float) -> None:
     light_field = wrap(two_planes(near=disparity, far=disparity, rows=rows, columns=columns))
