@@ -59,7 +59,7 @@ class Gallery:
         """Once a frame: look at these next, the first ones first, and at no others any more."""
         self._collect()
         missing = [path for path in paths[:HELD] if path not in self._seen]
-        self.complete = not missing
+        self.complete = bool(paths) and not missing
         if self._asked and not self._asked.intersection(missing):
             self._worker.cancel_all()
             self._asked = frozenset()

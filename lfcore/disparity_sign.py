@@ -142,12 +142,13 @@ def check_disparity(light_field: LightField) -> DisparityCheck:
     return near if far.order is Order.UNKNOWN else far
 
 
-def baselines_differ(light_field: LightField) -> bool:
-    """Whether rows and columns lie equally far apart in a grid that has more of one than of the other.
+def baselines_differ(light_field: LightField, check: DisparityCheck) -> bool:
+    """Whether rows and columns lie equally far apart in a grid that has more of one than of the other, and whose `check` so
+    could not tell.
 
     A synthesis from its corners takes both baselines as equal, as a LightField says, which they are not then.
     """
-    if light_field.rows == light_field.columns or check_disparity(light_field).order is not Order.UNKNOWN:
+    if light_field.rows == light_field.columns or check.order is not Order.UNKNOWN:
         return False
     squares = [(side - 1, side - 1) for side in range(min(light_field.rows, light_field.columns), 1, -1)]
     return any(_look(light_field, squares, look)[0].order is Order.AGREES for look in (_NEARER, _FARTHER))

@@ -84,6 +84,23 @@ def make_folder(folder: str | os.PathLike[str]) -> Path:
     return path
 
 
+@contextlib.contextmanager
+def removed_on_failure(folder: Path) -> Iterator[list[Path]]:
+    """Make the folder; where the block fails, remove the files of the yielded list, and the folders that were made."""
+    missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    make_folder(folder)
+    written: list[Path] = []
+    try:
+        yield written
+    except BaseException:
+        for file in written:
+            file.unlink(missing_ok=True)
+        for made in missing:
+            with contextlib.suppress(OSError):  # somebody else has put something there meanwhile
+                made.rmdir()
+        raise
+
+
 def write_image(path: str | os.PathLike[str], image: FloatArray) -> None:
     """Write a picture (H, W, 3), 1 = white: PNG with 8 bits, TIFF with 16 bits, EXR as half floats.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from lfcore.errors import OutputError
-from lfcore.export import check_folder_target, make_folder
+from lfcore.export import check_folder_target, removed_on_failure
 
 _STEM = "frame_"
 
@@ -31,25 +30,8 @@ def write_numbered(
     """
     path = check_frames_target(folder)
     digits = max(len(str(total)), 4)
-    with _removed_on_failure(path) as written:
+    with removed_on_failure(path) as written:
         for number, write in enumerate(writers, 1):
             target = path / f"{_STEM}{number:0{digits}}{extension}"
             written.append(target)
             write(target)
-
-
-@contextlib.contextmanager
-def _removed_on_failure(folder: Path) -> Iterator[list[Path]]:
-    """Make the folder; where the block fails, remove the files of the yielded list, and the folders that were made."""
-    missing = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-    make_folder(folder)
-    written: list[Path] = []
-    try:
-        yield written
-    except BaseException:
-        for file in written:
-            file.unlink(missing_ok=True)
-        for made in missing:
-            with contextlib.suppress(OSError):  # somebody else has put something there meanwhile
-                made.rmdir()
-        raise

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lfcore.errors import Cancelled, InputError
-from lfcore.export import check_folder_target, check_no_views, check_target, make_folder, write_picture, write_rows
+from lfcore.export import check_folder_target, check_no_views, check_target, removed_on_failure, write_picture, write_rows
 from lfcore.formats.eslf import LENSLET
 from lfcore.formats.images import MAX_BYTES
 from lfcore.lightfield import FloatArray, LightField
@@ -52,22 +52,13 @@ def write_views(
 
     `done` is told how many are written. An error or `cancelled` (which raises Cancelled) removes them again.
     """
-    made_here = not folder.exists()
-    make_folder(folder)
-    written: list[Path] = []
-    try:
+    with removed_on_failure(folder) as written:
         for count, (row, column, u, v) in enumerate(_grid(side), 1):
             _check(cancelled)
             target = folder / f"view_{row:02}_{column:02}.png"
             written.append(target)
             write_picture(target, to_uint8(view(u, v)))
             done(count)
-    except BaseException:
-        for file in written:
-            file.unlink(missing_ok=True)
-        if made_here and not any(folder.iterdir()):
-            folder.rmdir()
-        raise
 
 
 def write_eslf(

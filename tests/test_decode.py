@@ -11,6 +11,7 @@ import pytest
 from app.__main__ import main
 from lfcore.camera_files import private_metadata, public_metadata, write_capture
 from lfcore.camera_model import CameraModel, expose, f01, illum
+from lfcore.decode import output
 from lfcore.decode.kept import DecodedStore
 from lfcore.decode.pipeline import DecodeOptions, coarse_view, decode_capture, open_capture
 from lfcore.errors import Cancelled, InputError
@@ -202,6 +203,21 @@ def test_opened_captures_are_kept_and_damage_is_noticed(capture: Path, tmp_path:
     other.put("b", first)
     assert other.usage()[0] == 1
     assert other.get("b") is not None
+
+
+def test_views_that_could_not_all_be_written_are_removed(
+    capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So that decoding again is not refused for what is left of the last time."""
+    light_field = decode_capture(capture, None, DecodeOptions(views=2))
+
+    def fail(path: Path, written: LightField) -> Path:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(output, "_write_facts", fail)
+    with pytest.raises(KeyboardInterrupt):
+        output.write_views(tmp_path / "out" / "capture", light_field)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_orientation_is_honoured(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from lfcore.disparity_sign import Order, baselines_differ, check_disparity
 from lfcore.formats import open_light_field
-from lfcore.formats.checks import with_warnings
+from lfcore.formats.checks import put_in_order, with_warnings
 from lfcore.lightfield import LightField
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -144,16 +144,16 @@ def test_of_other_grids_than_square_ones_the_baselines_count_as_equal(rows: int,
     check = check_disparity(light_field)
     assert check.order is Order.AGREES
     assert check.median == pytest.approx(disparity, abs=0.5)
-    assert not baselines_differ(light_field)
+    assert not baselines_differ(light_field, check)
     assert check_disparity(wrap(light_field.views[::-1])).order is Order.REVERSED
 
 
 def test_a_grid_whose_views_lie_equally_far_apart_along_different_numbers_of_them_is_told() -> None:
     square = two_planes(near=12.0, far=-8.0, rows=5, columns=5)
-    assert not baselines_differ(wrap(square))
+    assert not baselines_differ(wrap(square), check_disparity(wrap(square)))
     light_field = wrap(square[1:4])
     assert check_disparity(light_field).order is Order.UNKNOWN
-    assert baselines_differ(light_field)
+    assert baselines_differ(light_field, check_disparity(light_field))
     assert "two baselines differ" in with_warnings(light_field).warnings[0]
 
 
@@ -161,3 +161,12 @@ def test_a_grid_whose_views_lie_equally_far_apart_along_different_numbers_of_the
 def test_very_long_views_cannot_be_told(size: tuple[int, int]) -> None:
     views = np.random.default_rng(2).integers(0, 255, (2, 2, *size, 3), dtype=np.uint8)
     assert check_disparity(wrap(views)).order is Order.UNKNOWN
+
+
+def test_views_put_in_order_are_warned_of_like_others() -> None:
+    views = two_planes(near=6.0, far=-3.0)
+    bright = wrap((views[::-1] / np.float32(128)).astype(np.float32))
+    put_right = put_in_order(bright)
+    np.testing.assert_array_equal(put_right.views, views / np.float32(128))
+    (warning,) = put_right.warnings
+    assert "lie above 1, up to" in warning

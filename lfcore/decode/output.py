@@ -10,7 +10,7 @@ import numpy as np
 
 from lfcore.atomic import atomic_path
 from lfcore.errors import InputError
-from lfcore.export import check_no_views, make_folder, write_stored
+from lfcore.export import check_no_views, removed_on_failure, write_stored
 from lfcore.formats.lytro.container import Container, is_container, open_container
 from lfcore.formats.lytro.fields import Fields
 from lfcore.formats.lytro.metadata import frames, read_capture
@@ -31,14 +31,16 @@ def write_eslf(path: Path, light_field: LightField) -> list[Path]:
 def write_views(folder: Path, light_field: LightField) -> list[Path]:
     """Write view_RR_CC.png into the folder, which is made, and the JSON beside it; returns the folder's and the JSON's path.
 
-    OutputError where it holds views already: those of two light fields would be taken for one.
+    OutputError where it holds views already: those of two light fields would be taken for one. An error or Ctrl-C on the way
+    removes what was written.
     """
     check_no_views(folder)
-    make_folder(folder)
-    for row in range(light_field.rows):
-        for column in range(light_field.columns):
-            write_stored(folder / f"view_{row:02}_{column:02}.png", light_field.views[row, column])
-    return [folder, _write_facts(folder.with_name(f"{folder.name}.json"), light_field)]
+    with removed_on_failure(folder) as written:
+        for row in range(light_field.rows):
+            for column in range(light_field.columns):
+                written.append(folder / f"view_{row:02}_{column:02}.png")
+                write_stored(written[-1], light_field.views[row, column])
+        return [folder, _write_facts(folder.with_name(f"{folder.name}.json"), light_field)]
 
 
 def _write_facts(path: Path, light_field: LightField) -> Path:

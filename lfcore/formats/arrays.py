@@ -15,7 +15,7 @@ import numpy as np
 from lfcore.errors import InputError
 from lfcore.formats.array_files import StoredArray, stored_arrays
 from lfcore.formats.checks import put_in_order, without_non_finite
-from lfcore.formats.dark import find_dark_views
+from lfcore.formats.dark import find_dark_views, has_dark_corner
 from lfcore.formats.images import MAX_BYTES, Pixels
 from lfcore.lightfield import LightField
 
@@ -85,7 +85,7 @@ def read(
         facts["Colour"] = "grey pictures, the one channel repeated"
     rows, columns = stored.shape[:2]
     dark = find_dark_views(stored)
-    if views < min(rows, columns) and not dark.isdisjoint({(0, 0), (0, columns - 1), (rows - 1, 0), (rows - 1, columns - 1)}):
+    if views < min(rows, columns) and has_dark_corner(dark, rows, columns):
         top, left = (rows - views) // 2, (columns - views) // 2
         stored = stored[top : top + views, left : left + views]
         dark = find_dark_views(stored)

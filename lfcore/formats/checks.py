@@ -25,7 +25,7 @@ def without_non_finite(view: Pixels) -> int:
 
 def with_warnings(light_field: LightField) -> LightField:
     """With warnings: rows and columns run against the pictures, their baselines differ, values lie above white."""
-    return _warned(light_field, check_disparity(light_field))
+    return _warned_of_order(warned_of_white(light_field), check_disparity(light_field))
 
 
 def put_in_order(light_field: LightField) -> LightField:
@@ -35,27 +35,38 @@ def put_in_order(light_field: LightField) -> LightField:
     """
     check = check_disparity(light_field)
     if check.order is not Order.REVERSED:
-        return _warned(light_field, check)
+        return _warned_of_order(warned_of_white(light_field), check)
     _reverse_rows(light_field.views)
     facts = {**light_field.facts, "Row order": "reversed, as the pictures show"}
-    return replace(light_field, facts=facts, dark=find_dark_views(light_field.views))
+    return warned_of_white(replace(light_field, facts=facts, dark=find_dark_views(light_field.views)))
 
 
-def _warned(light_field: LightField, check: DisparityCheck) -> LightField:
-    warnings = list(light_field.warnings)
-    if check.is_wrong:
-        warnings.append(check.sentence)
-    elif check.order is Order.UNKNOWN and baselines_differ(light_field):
-        grid = f"{light_field.rows} x {light_field.columns}"
-        warnings.append(
-            f"The views of this grid of {grid} lie equally far apart along rows and columns, so its two baselines differ, "
-            "which a synthesis takes as equal: open a square part of it, in a folder of its own."
-        )
+def warned_of_white(light_field: LightField) -> LightField:
+    """With a warning where values lie above white."""
     views = light_field.views
-    if views.dtype.kind == "f" and (most := float(views.max())) > 1:
-        share = np.count_nonzero(np.greater(views, 1)) / views.size
-        warnings.append(f"{share:.1%} of the values lie above 1, up to {most:g}; 1 is white, which is what they are taken for.")
-    return replace(light_field, warnings=tuple(warnings))
+    if views.dtype.kind != "f" or (most := float(views.max())) <= 1:
+        return light_field
+    share = np.count_nonzero(np.greater(views, 1)) / views.size
+    return _with(
+        light_field, f"{share:.1%} of the values lie above 1, up to {most:g}; 1 is white, which is what they are taken for."
+    )
+
+
+def _warned_of_order(light_field: LightField, check: DisparityCheck) -> LightField:
+    if check.is_wrong:
+        return _with(light_field, check.sentence)
+    if baselines_differ(light_field, check):
+        grid = f"{light_field.rows} x {light_field.columns}"
+        return _with(
+            light_field,
+            f"The views of this grid of {grid} lie equally far apart along rows and columns, so its two baselines differ, "
+            "which a synthesis takes as equal: open a square part of it, in a folder of its own.",
+        )
+    return light_field
+
+
+def _with(light_field: LightField, warning: str) -> LightField:
+    return replace(light_field, warnings=(*light_field.warnings, warning))
 
 
 def _reverse_rows(views: Pixels) -> None:

@@ -18,6 +18,11 @@ def brightness(views: Pixels) -> np.ndarray:
     return views[:, :, ::_STRIDE, ::_STRIDE].mean(axis=(2, 3, 4), dtype=np.float64)
 
 
+def has_dark_corner(dark: frozenset[tuple[int, int]], rows: int, columns: int) -> bool:
+    """Whether one of the views that a synthesis is made from is among the dark ones."""
+    return not dark.isdisjoint({(0, 0), (0, columns - 1), (rows - 1, 0), (rows - 1, columns - 1)})
+
+
 def find_dark_views(views: Pixels) -> frozenset[tuple[int, int]]:
     """(row, column) of the views whose brightness is under half of that of the grid's centre."""
     levels = brightness(views)

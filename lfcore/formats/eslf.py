@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lfcore.errors import Cancelled, InputError
-from lfcore.formats.dark import find_dark_views
+from lfcore.formats.checks import warned_of_white
+from lfcore.formats.dark import find_dark_views, has_dark_corner
 from lfcore.formats.images import Header, Picture, Pixels, check_memory, open_picture, read_header
 from lfcore.lightfield import LightField
 
@@ -87,9 +88,9 @@ def read(
         warnings.append(
             f"{path.name} shows no pattern of 14 x 14 px microlenses; it may be an ordinary photograph of a size that divides."
         )
-    if any(corner in dark for corner in ((0, 0), (0, views - 1), (views - 1, 0), (views - 1, views - 1))):
+    if has_dark_corner(dark, views, views):
         warnings.append("The corner views are dark, and so is what is synthesized from them: open the middle 8 x 8.")
-    return LightField(
+    light_field = LightField(
         views=sliced,
         name=path.stem,
         source=str(path),
@@ -98,6 +99,7 @@ def read(
         warnings=tuple(warnings),
         dark=dark,
     )
+    return warned_of_white(light_field)
 
 
 def _slice(
