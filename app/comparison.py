@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from app.limits import within
+
 # Partners that are no model; the texts are their names on screen.
 CAPTURED_VIEW = "captured view"
 INSTANT = "instant"
@@ -69,7 +71,7 @@ class Comparison:
 
     def bounded(self) -> Comparison:
         """The same with the handle within the picture's area."""
-        return replace(self, wipe=min(max(self.wipe, 0.0), 1.0))
+        return replace(self, wipe=within(self.wipe, (0.0, 1.0)))
 
 
 def partners(models: Sequence[str], model: str) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from app.engine import Answer, Engine, ModelChoice, disparity_range
 from app.exhibits import Exhibit, Exhibition
 from app.exports import Exports, take_plan
 from app.eyes import Eyes
-from app.focusing import FocusFacts, captured_sliced, captured_summed, carried_disparity, focus_limits, within
+from app.focusing import FocusFacts, among, captured_sliced, captured_summed, carried_disparity, focus_limits
 from app.foresight import captured_viewpoints, heading, viewpoints_ahead
 from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
@@ -346,8 +346,8 @@ class Controller:
         self._aimed = light_field
         limits = focus_limits(self._screen.span)
         if limits[0] > LEVELS[1] or limits[1] < LEVELS[0]:
-            self.state.focusing = self.state.focusing.within(limits)
-            self.state.looking = replace(self.state.looking, level=within(self.state.looking.level, limits))
+            self.state.focusing = self.state.focusing.among(limits)
+            self.state.looking = replace(self.state.looking, level=among(self.state.looking.level, limits))
 
     def _pick(self) -> None:
         """Focus on the point that was clicked, as soon as its disparity is known."""

@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 
 from app.geometry import Point
+from app.limits import within
 from app.settings import SCALE_LIMITS, Theme
 
 SCALE_STEP = 0.25
@@ -46,7 +47,7 @@ class Desk:
     def change_scale(self, steps: int, present: float) -> None:
         """Larger or smaller by so many steps, from the scale at present."""
         scale = (round(present / SCALE_STEP) + steps) * SCALE_STEP
-        self.scale = min(max(scale, SCALE_LIMITS[0]), SCALE_LIMITS[1])
+        self.scale = within(scale, SCALE_LIMITS)
 
 
 @dataclass(frozen=True)

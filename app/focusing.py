@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry import Point
+from app.limits import within
 from lfcore.key_frames import MAX_FOCUS
 from lfcore.refocus import captured_serve
 
@@ -48,15 +49,15 @@ class Focusing:
         """With everything held within its limits."""
         return replace(
             self,
-            focus=_between(self.focus, (-MAX_FOCUS, MAX_FOCUS)),
-            aperture=_between(self.aperture, APERTURE_LIMITS),
-            baseline=_between(self.baseline, BASELINE_LIMITS),
-            convergence=_between(self.convergence, (-MAX_FOCUS, MAX_FOCUS)),
+            focus=within(self.focus, (-MAX_FOCUS, MAX_FOCUS)),
+            aperture=within(self.aperture, APERTURE_LIMITS),
+            baseline=within(self.baseline, BASELINE_LIMITS),
+            convergence=within(self.convergence, (-MAX_FOCUS, MAX_FOCUS)),
         )
 
-    def within(self, limits: tuple[float, float]) -> Focusing:
+    def among(self, limits: tuple[float, float]) -> Focusing:
         """With focus and convergence in the middle of these disparities where they lie outside, and nothing would be sharp."""
-        return replace(self, focus=within(self.focus, limits), convergence=within(self.convergence, limits))
+        return replace(self, focus=among(self.focus, limits), convergence=among(self.convergence, limits))
 
     def focused_at(self, disparity: float) -> Focusing:
         """Sharp at this disparity."""
@@ -87,7 +88,7 @@ class FocusFacts:
     exact_eyes: bool = False
 
 
-def within(disparity: float, limits: tuple[float, float]) -> float:
+def among(disparity: float, limits: tuple[float, float]) -> float:
     """The disparity, or the middle of the limits where it lies outside."""
     low, high = limits
     return disparity if low <= disparity <= high else (low + high) / 2
@@ -124,7 +125,7 @@ def carried_disparity(disparity_map: npt.NDArray[np.float32], made_at: Point, vi
     def looked_up(disparity: float) -> float:
         x = int(np.floor(column + shift[0] * disparity + 0.5))
         y = int(np.floor(row + shift[1] * disparity + 0.5))
-        return float(disparity_map[min(max(y, 0), height - 1), min(max(x, 0), width - 1)])
+        return float(disparity_map[within(y, (0, height - 1)), within(x, (0, width - 1))])
 
     from_here, from_near = 0.0, float(disparity_map.min())
     before = from_near
@@ -148,7 +149,3 @@ def place_in_slice(share: float) -> float:
 def share_of_slice(place: float) -> float:
     """The inverse of `place_in_slice`."""
     return (place - SLICE_RANGE[0]) / (SLICE_RANGE[1] - SLICE_RANGE[0])
-
-
-def _between(value: float, limits: tuple[float, float]) -> float:
-    return min(max(value, limits[0]), limits[1])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.limits import within
+
 Point = tuple[float, float]
 Size = tuple[int, int]
 
@@ -79,7 +81,7 @@ def fit_scale(picture: Size, area: Rect) -> float:
 def zoom_about(zoom: Zoom, factor: float, point: Point, picture: Size, area: Rect) -> Zoom:
     """Magnify by `factor` while the picture point under the window point `point` stays there."""
     before = place(zoom, picture, area)
-    scale = min(max(before.scale * factor, ZOOM_LIMITS[0]), ZOOM_LIMITS[1])
+    scale = within(before.scale * factor, ZOOM_LIMITS)
     fixed = before.to_picture(point)
     centre_x = (fixed[0] + (area.x + area.width / 2 - point[0]) / scale) / picture[0]
     centre_y = (fixed[1] + (area.y + area.height / 2 - point[1]) / scale) / picture[1]
@@ -94,4 +96,4 @@ def pan_by(zoom: Zoom, delta: Point, picture: Size, area: Rect) -> Zoom:
 
 
 def _inside_picture(centre: Point) -> Point:
-    return min(max(centre[0], 0.0), 1.0), min(max(centre[1], 0.0), 1.0)
+    return within(centre[0], (0.0, 1.0)), within(centre[1], (0.0, 1.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from app.limits import within
 from app.tone import Curve, Tone
 from lfcore.colormaps import ColourMap
 from lfcore.key_frames import MAX_FOCUS
@@ -38,11 +39,11 @@ class Looking:
     def bounded(self) -> Looking:
         """With everything held within its limits."""
         chosen = self.with_range(*self.hand_range) if self.hand_range is not None else self
-        return replace(chosen, tone=self.tone.bounded(), level=_between(self.level, RANGE_LIMITS))
+        return replace(chosen, tone=self.tone.bounded(), level=within(self.level, RANGE_LIMITS))
 
     def with_range(self, low: float, high: float) -> Looking:
         """With colours from and to these disparities, LEAST_RANGE apart at the least."""
-        low, high = _between(min(low, high), RANGE_LIMITS), _between(max(low, high), RANGE_LIMITS)
+        low, high = within(min(low, high), RANGE_LIMITS), within(max(low, high), RANGE_LIMITS)
         middle, half = (low + high) / 2, max(high - low, LEAST_RANGE) / 2
         return replace(self, hand_range=(middle - half, middle + half))
 
@@ -55,7 +56,7 @@ class Looking:
 
     def at_next_level(self, step: int, limits: tuple[float, float]) -> Looking:
         """At the level so many steps further; levels are those of the disparity network, or lie between or beyond them."""
-        return replace(self, level=_between(self.level + step * LEVEL_STEP, limits))
+        return replace(self, level=within(self.level + step * LEVEL_STEP, limits))
 
     def next_colour_map(self) -> Looking:
         """With the colour map after this one, going round."""
@@ -72,7 +73,3 @@ def level_limits(disparities: tuple[float, float] | None) -> tuple[float, float]
     """From which to which level the plane sweep is looked at, where these disparities are shown."""
     low, high = disparities or LEVELS
     return min(low, LEVELS[0]), max(high, LEVELS[1])
-
-
-def _between(value: float, limits: tuple[float, float]) -> float:
-    return min(max(value, limits[0]), limits[1])

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from app.engine import Answer, disparity_range
 from app.geometry import Point
+from app.limits import within
 from app.readout import ScoreText
 from app.state import SEAMLESS, Step
 
@@ -34,7 +35,7 @@ class OnScreen:
     @property
     def share(self) -> float:
         """How far the newest synthesis has been faded in."""
-        return min(max((self._now - self._fade_from) / FADE_SECONDS, 0.0), 1.0)
+        return within((self._now - self._fade_from) / FADE_SECONDS, (0.0, 1.0))
 
     def pass_time(self, now: float) -> None:
         """It is `now`, in seconds, perhaps long after the last frame: what comes from now on fades in from now on."""

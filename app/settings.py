@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 
+from app.limits import within
 from app.plain_json import Json, read_fields, to_json
 from lfcore.atomic import atomic_path
 from lfcore.errors import OutputError
@@ -140,7 +141,7 @@ def _bounded(settings: Settings) -> Settings:
     if window is not None and not (1 <= window.width <= 2**15 and 1 <= window.height <= 2**15):
         window = None
     if scale is not None:
-        scale = min(max(scale, SCALE_LIMITS[0]), SCALE_LIMITS[1])
+        scale = within(scale, SCALE_LIMITS)
     recent = tuple(dict.fromkeys(path for path in settings.recent if 0 < len(path) <= _TEXT_LIMIT))[:RECENT_LIMIT]
     usable = [
         (key, look) for key, look in settings.files.items() if len(key) <= _TEXT_LIMIT and len(json.dumps(look)) <= _LOOK_LIMIT

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from app.geometry import ZOOM_LIMITS
+from app.limits import within
 from app.plain_json import Json, field_types, from_json, to_json
 from app.state import GAIN_LIMITS, TAIL_LIMITS, ViewState
 
@@ -43,15 +44,11 @@ def _hold_within_limits(state: ViewState) -> None:
     """What a file says may have been written by any hand."""
     state.move_to(state.u, state.v)
     zoom = state.zoom
-    scale = None if zoom.scale is None else _between(zoom.scale, ZOOM_LIMITS)
-    centre = (_between(zoom.centre[0], (0.0, 1.0)), _between(zoom.centre[1], (0.0, 1.0)))
+    scale = None if zoom.scale is None else within(zoom.scale, ZOOM_LIMITS)
+    centre = (within(zoom.centre[0], (0.0, 1.0)), within(zoom.centre[1], (0.0, 1.0)))
     state.zoom = replace(zoom, scale=scale, centre=centre)
-    state.gain = _between(state.gain, GAIN_LIMITS)
-    state.tail = _between(state.tail, TAIL_LIMITS)
+    state.gain = within(state.gain, GAIN_LIMITS)
+    state.tail = within(state.tail, TAIL_LIMITS)
     state.looking = state.looking.bounded()
     state.focusing = state.focusing.bounded()
     state.comparison = state.comparison.bounded()
-
-
-def _between(value: float, limits: tuple[float, float]) -> float:
-    return min(max(value, limits[0]), limits[1])

@@ -11,6 +11,7 @@ from app.desk import Desk
 from app.export_choices import ExportChoices
 from app.focusing import Focusing
 from app.geometry import Point, Zoom
+from app.limits import within
 from app.looking import Looking
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 
@@ -141,7 +142,7 @@ SEAMLESS = 0.1  # one quick synthesis takes the place of another so near without
 
 def carried_share(distance: float, reach: Reach = CARRIED) -> float:
     """Share of a synthesis, carried over this distance, in the picture on screen; the rest is that of the corner views."""
-    return min(max((reach.far - distance) / (reach.far - reach.near), 0.0), 1.0)
+    return within((reach.far - distance) / (reach.far - reach.near), (0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -161,8 +162,8 @@ class Grid:
 
     def nearest(self, u: float, v: float) -> int:
         """Number of the captured view nearest to (u, v)."""
-        row = min(max(round(v * (self.rows - 1)), 0), self.rows - 1)
-        column = min(max(round(u * (self.columns - 1)), 0), self.columns - 1)
+        row = within(round(v * (self.rows - 1)), (0, self.rows - 1))
+        column = within(round(u * (self.columns - 1)), (0, self.columns - 1))
         return row * self.columns + column
 
     def stepped(self, u: float, v: float, step: int) -> int:
@@ -178,8 +179,8 @@ class Grid:
 
 def clamp_viewpoint(u: float, v: float) -> Point:
     """The nearest viewpoint at most EXTRAPOLATION_LIMIT beyond the corners."""
-    low, high = -EXTRAPOLATION_LIMIT, 1 + EXTRAPOLATION_LIMIT
-    return min(max(u, low), high), min(max(v, low), high)
+    limits = (-EXTRAPOLATION_LIMIT, 1 + EXTRAPOLATION_LIMIT)
+    return within(u, limits), within(v, limits)
 
 
 @dataclass
@@ -245,8 +246,8 @@ class ViewState:
     def change_contrast(self, factor: float) -> None:
         """More (factor > 1) or less contrast of what is looked at, where it has any."""
         if self.look in (Look.ERROR, Look.LEAN) or self.look.is_deviation:
-            self.gain = min(max(self.gain * factor, GAIN_LIMITS[0]), GAIN_LIMITS[1])
+            self.gain = within(self.gain * factor, GAIN_LIMITS)
         elif self.look is Look.DISPARITY and self.looking.hand_range is not None:
             self.looking = self.looking.with_range_scaled(1 / factor)
         elif self.look is Look.DISPARITY:
-            self.tail = min(max(self.tail + (1.0 if factor > 1 else -1.0), TAIL_LIMITS[0]), TAIL_LIMITS[1])
+            self.tail = within(self.tail + (1.0 if factor > 1 else -1.0), TAIL_LIMITS)

@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from app.limits import within
 from lfcore.display_tone import brightened
 from lfcore.lightfield import FloatArray
 
@@ -47,11 +48,11 @@ class Tone:
 
     def exposed(self, stops: float) -> Tone:
         """With so many stops more, within the limits."""
-        return replace(self, stops=min(max(self.stops + stops, STOPS_LIMITS[0]), STOPS_LIMITS[1]))
+        return replace(self, stops=within(self.stops + stops, STOPS_LIMITS))
 
     def bounded(self) -> Tone:
         """With stops and gamma held within their limits."""
-        return replace(self.exposed(0.0), gamma=min(max(self.gamma, GAMMA_LIMITS[0]), GAMMA_LIMITS[1]))
+        return replace(self.exposed(0.0), gamma=within(self.gamma, GAMMA_LIMITS))
 
     def next_curve(self) -> Tone:
         """With the curve after this one, going round."""

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import commands, theme
 from app.geometry import Rect
+from app.limits import within
 
 # Nothing but its contents.
 BARE = (
@@ -244,7 +245,12 @@ def slider(label: str, value: float, limits: tuple[float, float], shown: str, hi
     right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
     imgui.set_cursor_pos_x(right - imgui.calc_text_size(shown).x)
     text(shown)
-    return moved if changed else value  # not as imgui has rounded it
+    return typed(moved, value, limits) if changed else value  # not as imgui has rounded it
+
+
+def typed(value: float, before: float, limits: tuple[float, float]) -> float:
+    """What was typed into a field, within its limits; what was there before where that is no number ("nan", "inf")."""
+    return within(value, limits) if math.isfinite(value) else before
 
 
 def packed(colour: ImVec4) -> int:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+import av  # noqa: F401  adds a logger; a thread of the program's would, at a moment when pytest walks through the loggers
 import pytest
 from virtual_screen import VirtualScreen, require_tools, virtual_screen
 

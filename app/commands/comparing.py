@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from app.commands.kinds import COMPARING, Command, Context, Run, toggle
 from app.comparison import WIPE_STEP, Arrangement, Difference, partners
+from app.limits import within
 from app.scoring import RULES
 from app.state import Look, Tab
 
@@ -27,7 +28,7 @@ def _wipe(step: float) -> Run:
     def run(context: Context) -> None:
         comparison = context.state.comparison
         if comparison.arrangement is Arrangement.WIPE:
-            context.state.comparison = replace(comparison, wipe=min(max(comparison.wipe + step, 0.0), 1.0))
+            context.state.comparison = replace(comparison, wipe=within(comparison.wipe + step, (0.0, 1.0)))
 
     return run
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.commands.kinds import EXPORTING, Command, Context, Needs, Run, request
 from app.export_choices import LAYERS, RADIUS_LIMITS, SHAPES, SIZES, Format, Product
 from app.export_requests import ExportAction
+from app.limits import within
 from app.state import Look, Tab
 
 
@@ -54,8 +55,7 @@ def _toggled(field: str) -> Run:
 
 def _reach(step: float) -> Run:
     def run(context: Context) -> None:
-        low, high = RADIUS_LIMITS
-        _set("radius", min(max(context.state.export.radius + step, low), high))(context)
+        _set("radius", within(context.state.export.radius + step, RADIUS_LIMITS))(context)
 
     return run
 

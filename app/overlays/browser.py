@@ -8,6 +8,7 @@ from app import theme
 from app.commands import Browse, Context, OpenPath
 from app.desk import Card, Folder, Shelf
 from app.geometry import Rect
+from app.limits import within
 from app.overlays import tiles
 from app.widgets import BARE, bring_into_sight, button, elided, em, font, text, tooltip
 
@@ -74,7 +75,7 @@ def _tiles(folder: Folder, context: Context, shelf: Shelf) -> None:
     step = one.x + (room - columns * one.x) / max(columns - 1, 1)  # from column to column, so that they fill the width
     rows = -(-len(members) // columns)
     moved = _moved(columns, imgui.get_window_height() // (one.y + gap), len(members))
-    desk.chosen = min(max(desk.chosen + moved, 0), len(members) - 1)
+    desk.chosen = within(desk.chosen + moved, (0, len(members) - 1))
     if moved:
         bring_into_sight(desk.chosen // columns * (one.y + gap), one.y)
     first = max(int(imgui.get_scroll_y() // (one.y + gap)), 0)

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app import theme
 from app.comparison import BLOCK_RANGE, CAPTURED_VIEW, INSTANT, Arrangement, Difference
 from app.geometry import Rect, Size
+from app.limits import within
 from app.panes import Pane, handle
 from app.readout import Readout, ScoreText
 from app.state import Look, Step, ViewState
@@ -105,7 +106,7 @@ def wipe_handle(area: Rect, panes: tuple[Pane, ...], state: ViewState) -> None:
         held, hovered = imgui.is_item_active(), imgui.is_item_hovered()
         if held or imgui.is_item_deactivated():
             share = (imgui.get_mouse_pos().x - area.x) / area.width
-            state.comparison = replace(comparison, wipe=min(max(share, 0.0), 1.0))
+            state.comparison = replace(comparison, wipe=within(share, (0.0, 1.0)))
             x = handle(state.comparison, area)
         else:
             tooltip("Drag to wipe between the picture and its partner  (Shift+Left and Shift+Right)")

@@ -8,6 +8,7 @@ from app import commands, theme
 from app.commands import COMMANDS, Command, Context
 from app.desk import Card
 from app.geometry import Rect
+from app.limits import within
 from app.widgets import bring_into_sight, card, elided, em, packed, text
 
 _ROWS = 12
@@ -52,7 +53,7 @@ def palette(area: Rect, context: Context) -> None:
         found = matches(desk.query, context)
         rows = max(min(len(found), _ROWS, int((0.85 * area.height - 5 * em()) // imgui.get_frame_height())), 1)
         moved = _steps()
-        desk.chosen = min(max(desk.chosen + moved, 0), max(len(found) - 1, 0))
+        desk.chosen = within(desk.chosen + moved, (0, max(len(found) - 1, 0)))
         clicked = _list(found, rows, desk.chosen, moved != 0) if found else None
         if not found:
             text("No command has these words", theme.TEXT_SOFT)

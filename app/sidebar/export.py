@@ -12,10 +12,11 @@ from app.commands import Context
 from app.export_choices import KEY_FRAMES, LAYERS, RADIUS_LIMITS, SHAPES, SIZES, ExportChoices, Format, Product
 from app.export_requests import CancelExport, ExportAction
 from app.exporting import Phase, Status
+from app.limits import within
 from app.progress import clock
 from app.readout import Readout
 from app.state import Grid
-from app.widgets import button, choice, elided, em, font, heading, number, slider, text, tooltip, wrapped
+from app.widgets import button, choice, elided, em, font, heading, number, slider, text, tooltip, typed, wrapped
 from lfcore.key_frames import MAX_FOCUS
 from lfcore.quilt import MAX_VIEWS
 from lfcore.sweep_plan import GAIN_LIMITS, MAX_FPS, MAX_PLAYS, Layer
@@ -77,7 +78,7 @@ def _length(choices: ExportChoices) -> None:
     imgui.same_line(_LABEL * em())
     imgui.set_next_item_width(4.4 * em())
     _, frames = imgui.input_int("##frames", choices.frames, 0)
-    choices.frames = min(max(frames, 1), max(_MOST_FRAMES, choices.frames))
+    choices.frames = within(frames, (1, max(_MOST_FRAMES, choices.frames)))
     tooltip("Number of frames")
     imgui.same_line()
     text("at", theme.TEXT_SOFT)
@@ -87,7 +88,7 @@ def _length(choices: ExportChoices) -> None:
         imgui.get_content_region_avail().x - imgui.calc_text_size(unit).x - imgui.get_style().item_spacing.x
     )
     _, fps = imgui.input_float("##fps", choices.fps, 0.0, 0.0, "%.4g")
-    choices.fps = min(max(fps, _LEAST_FPS), MAX_FPS)
+    choices.fps = typed(fps, choices.fps, (_LEAST_FPS, MAX_FPS))
     tooltip("Frames per second")
     imgui.same_line()
     text(unit, theme.TEXT_SOFT)
@@ -97,7 +98,7 @@ def _focus(choices: ExportChoices) -> None:
     first, last = choices.focus
     limits = (-MAX_FOCUS, MAX_FOCUS)
     if choices.shape == KEY_FRAMES:
-        of_keys = " \N{RIGHTWARDS ARROW} ".join(number(key.focus or 0.0, 1) for key in choices.key_frames)
+        of_keys = ", ".join(number(key.focus or 0.0, 1) for key in choices.key_frames)
         text(elided(f"{of_keys} px", imgui.get_content_region_avail().x), theme.TEXT_FAINT)
         tooltip("Disparity in focus at the key frames, px from corner to corner")
     else:
@@ -265,14 +266,14 @@ def _whole(label: str, value: int, limits: tuple[int, int], hint: str) -> int:
     _labelled(label)
     _, value = imgui.input_int(f"##{label}", value)
     tooltip(hint)
-    return min(max(value, limits[0]), limits[1])
+    return within(value, limits)
 
 
 def _decimal(label: str, value: float, limits: tuple[float, float], shown: str, hint: str) -> float:
     _labelled(label)
-    _, value = imgui.input_float(f"##{label}", value, 1.0, 5.0, shown)
+    _, changed = imgui.input_float(f"##{label}", value, 1.0, 5.0, shown)
     tooltip(hint)
-    return min(max(value, limits[0]), limits[1])
+    return typed(changed, value, limits)
 
 
 def _typed(label: str, value: str, hint: str) -> str:

@@ -12,7 +12,7 @@ from app.looking import RANGE_LIMITS, level_limits
 from app.readout import Readout
 from app.state import GAIN_LIMITS, TAIL_LIMITS, Look
 from app.tone import CURVE_MEANING, GAMMA_LIMITS, STOPS_LIMITS, Curve
-from app.widgets import choice, em, heading, number, slider, switch, text, tile, tooltip
+from app.widgets import choice, em, heading, number, slider, switch, text, tile, tooltip, typed
 from lfcore.colormaps import ColourMap
 from lfcore.nearest_inputs import NEIGHBOURS
 
@@ -141,6 +141,7 @@ def _range(context: Context, readout: Readout) -> None:
         changed, low, high = imgui.drag_float_range2("##range", *hand_range, 0.02, *RANGE_LIMITS, "%.2f", "%.2f")
         tooltip("Disparities of the first and the last colour, px over the baseline: drag, or Ctrl + click and type.")
         if changed:
+            low, high = (typed(now, before, RANGE_LIMITS) for now, before in zip((low, high), hand_range, strict=True))
             state.looking = state.looking.with_range(low, high)
     imgui.begin_disabled(hand_range is None and readout.disparity_range is None)
     switch("Range by hand", "hand range", hand_range is not None, context)

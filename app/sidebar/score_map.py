@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
 from app.commands import Context
+from app.limits import within
 from app.readout import Readout, ScoreText
 from app.state import Grid
 from app.widgets import DASH, decibels, em, number, packed, pairs, tile, tooltip
@@ -89,7 +90,7 @@ def _colour(readout: Readout, grid: Grid, index: int, total: Summary) -> ImVec4:
         return theme.FIELD
     span = total.greatest - total.least
     share = (score.psnr - total.least) / span if math.isfinite(span) and span > 0 else 1.0
-    return _stops()[round(min(max(share, 0.0), 1.0) * 255)]
+    return _stops()[round(within(share, (0.0, 1.0)) * 255)]
 
 
 def _words(readout: Readout, grid: Grid, index: int) -> str:
