@@ -12,7 +12,8 @@ import pytest
 from app import painting
 from app.canvas import BACKGROUND, Canvas, Frame, Target, WindowCopy, standalone_functions
 from app.geometry import Placement, Rect
-from app.painting import Moved, Places, Spread, in_bytes
+from app.painting import Box, Moved, Places, Spread, in_bytes
+from app.repainting import Repainting, paint
 from app.state import CARRIED_IN_SOFTWARE, Look
 from app.tone import Curve, Tone
 from lfcore.lightfield import FloatArray
@@ -280,3 +281,27 @@ def test_a_picture_beside_the_area_is_not_to_be_seen(canvases: tuple[Canvas, Can
     give_both(canvases, 1, MADE_AT, two_planes())
     shown = window_of(canvases[0], gl, Frame(Look.SYNTHESIS, MADE_AT), Placement(1.0, (280.0, 0.0)))
     np.testing.assert_allclose(shown, np.broadcast_to(np.round(np.array(BACKGROUND) * 255), shown.shape), atol=1)
+
+
+def test_a_window_painted_where_it_has_changed_keeps_no_earlier_picture(canvases: tuple[Canvas, Canvas]) -> None:
+    """Faded in, at rest, carried, and back again."""
+    canvas, placement = canvases[0], Placement(1.5, (30.0, 20.0))
+    random = np.random.default_rng(3)
+    repainting, sheet = Repainting(), np.zeros((WINDOW[1], WINDOW[0], 4), np.uint8)
+    whole, looked_at = Box(0, 0, *WINDOW), 0
+    for turn in range(100):
+        if turn < 2 or random.random() < 0.15:
+            give_both(canvases, int(random.integers(6)), VIEWPOINTS[int(random.integers(2))], two_planes())
+        share = float(random.choice((0.3, 0.9, 1.0, 1.0)))
+        frame = Frame(Look.SYNTHESIS, VIEWPOINTS[int(random.integers(3))], share=share)
+        canvas.prepare(frame)
+        if canvas.copied(frame, AREA, placement) is None:  # one that is faded in over the corner views is drawn
+            repainting.forget()
+            continue
+        layers = canvas.beneath(frame, WINDOW, [], BACKGROUND, AREA, placement)
+        paint(sheet, repainting.outdated(WINDOW, layers, []), layers, [])
+        expected = np.zeros_like(sheet)
+        paint(expected, [whole], layers, [])
+        np.testing.assert_array_equal(sheet, expected)
+        looked_at += 1
+    assert looked_at > 60

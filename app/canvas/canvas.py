@@ -302,7 +302,7 @@ class Canvas:
             Fill(Box(*_rounded(ground)), colour) for ground, colour in _grounds(rectangles, background, copied, size)
         ]
         seen = Box(copied.x, copied.y, copied.x + copied.width, copied.y + copied.height)
-        number = self._light_fields, self._at_hand.textures.made
+        number = self._light_fields, made.number
         return [*layers, Enlarged(seen, made.pixels, placement, number)]
 
     def sheets(self, target: Target) -> Sheets:

@@ -40,6 +40,11 @@ class Made(ABC):
         """What it was last made for."""
         return self._owner.current.get(self, ())
 
+    @property
+    def number(self) -> int:
+        """Another one each time that it is made, and no other picture's of the same owner."""
+        return self._owner.numbers.get(self, 0)
+
 
 class Picture(Made):
     """A texture that a pass draws into, and what it was last drawn for. Its memory is taken when it is first used: most looks
@@ -122,6 +127,7 @@ class Textures:
         self.sheet = Picture(context, (2 * width, 2 * height), picture_type, self)
         self.precise = Picture(context, self.size, "f4", self)
         self.made = 0  # how often a target was made
+        self.numbers: dict[object, int] = {}  # that of each target's last making
         self.current: dict[object, tuple[object, ...]] = {}  # what each target was last made for
 
     def take_synthesis(
@@ -197,6 +203,7 @@ class Textures:
             return False
         self.current[target] = made_for
         self.made += 1
+        self.numbers[target] = self.made
         return True
 
     def release(self) -> None:
