@@ -42,9 +42,10 @@ class Wish:
 
 @dataclass(frozen=True)
 class NotAnswered:
-    """Why a wish could not be fulfilled, for the person at the screen."""
+    """Why a wish could not be fulfilled, for the person at the screen; the wish, where it is the latest one."""
 
     message: str
+    wish: Wish | None
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class Asking:
         while not self._worker.outcomes.empty():
             outcome = self._worker.outcomes.get()
             if not isinstance(outcome, Done):
-                yield NotAnswered(outcome.message)
+                yield NotAnswered(outcome.message, self.wish if outcome.ticket == self._ticket else None)
             elif outcome.ticket >= self._first_ticket:
                 yield outcome.value
 

@@ -54,13 +54,14 @@ class Comparing:
         self._worker: LatestWorker[Measured] = LatestWorker("measuring", wake, SYNTHESIS_NICENESS)
         self._ticket = 0
         self._place: tuple[LightField, str | None, Point] | None = None  # what `answer` is for
+        self._given_up: tuple[LightField, str | None, Point] | None = None  # the place where that failed
         self._subject: _Subject | None = None  # what `measured` is of, or will be
         self._captured: tuple[Point, FloatArray] | None = None  # the captured view there
         self._instant: tuple[Answer, FloatArray] | None = None  # the instant picture beside that one
 
     def forget(self) -> None:
         """Another light field, or none."""
-        self.answer = self._place = self._captured = self._instant = None
+        self.answer = self._place = self._given_up = self._captured = self._instant = None
         self.instant_wanted = False
         self._drop()
 
@@ -81,9 +82,13 @@ class Comparing:
         if self._place is None or self.answer is not None:
             return None
         _, model, viewpoint = self._place
-        if model is None or self._engine.failed_by(model):
+        if model is None or self._engine.failed_by(model) or self._place == self._given_up:
             return None
         return Wish(Task.COMPARE, viewpoint, model)
+
+    def give_up(self) -> None:
+        """The partner cannot be synthesized here; it is tried again at another viewpoint."""
+        self._given_up = self._place
 
     def take(self, wish: Wish, answer: Answer) -> None:
         """A synthesis by another model has come."""

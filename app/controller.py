@@ -28,6 +28,7 @@ from app.geometry import Point
 from app.loading import FindPreview, Loading, NotOpened, Open, Preview
 from app.looking import LEVELS
 from app.on_screen import OnScreen, viewpoint_of
+from app.readable import readable
 from app.readout import Compared, Readout
 from app.samples import Samples
 from app.sampling import Sampler
@@ -92,6 +93,7 @@ class Controller:
         self._cached: dict[Point, None] = {}  # viewpoints in memory, the one used longest ago first
         self._faulted = False  # the last query failed, and the viewpoint has not moved since
         self._hits = 0
+        self._not_opened: str | None = None  # why the last path could not be opened
 
     # What the person asks for.
 
@@ -121,14 +123,19 @@ class Controller:
         self._take(light_field)
 
     def say(self, message: str) -> None:
-        """Show a message until it is dismissed; one that is already there is not said twice."""
-        if message not in self.messages:
-            self.messages.append(message)
+        """Show a message until it is dismissed, over all others; one that is already there is not said twice."""
+        self.unsay(message)
+        self.messages.append(message)
+
+    def unsay(self, message: str | None) -> None:
+        """Put a message away that has become untrue, where it is still shown."""
+        if message in self.messages:
+            self.messages.remove(message)
 
     def dismiss(self) -> None:
-        """Put the oldest message away."""
+        """Put the newest message away, which is the one that is shown."""
         if self.messages:
-            self.messages.pop(0)
+            self.messages.pop()
 
     def touch(self) -> None:
         """The person does something: whatever is being computed ahead stops at once."""
@@ -188,7 +195,7 @@ class Controller:
         self._compare(self.light_field)
         self.eyes.look_up(self.light_field, self.state, self._cached)
         if not self.previewing:
-            useless = self._resting and self._newest_disparity  # what was asked for elsewhere, to be carried here
+            useless = self._resting and self.has_disparity  # what was asked for elsewhere, to be carried here
             self._asking.ask(self.light_field, self._wanted(self.light_field), useless)
 
     @property
@@ -205,7 +212,7 @@ class Controller:
     def name(self) -> str:
         """Of what is open; empty where nothing is."""
         opened = self.light_field or self.exhibition
-        return opened.name if opened is not None else ""
+        return readable(opened.name) if opened is not None else ""
 
     @property
     def share(self) -> float:
@@ -246,7 +253,7 @@ class Controller:
             return Step.CAPTURED
         if self.picture is not None:
             return self.picture.step
-        if self.newest is None or not self._newest_disparity:
+        if self.newest is None or not self.has_disparity:
             return Step.BLEND
         carried = carried_share(math.dist(viewpoint_of(self.newest), self.viewpoint))
         return Step.REALTIME if self.newest.step is Step.REALTIME and carried >= 0.5 else Step.INSTANT
@@ -295,7 +302,7 @@ class Controller:
             messages=tuple(self.messages),
             timings=tuple(newest.synthesis.timings.items()) if newest else (),
             disparity_range=self.disparity_range,
-            has_disparity=self._newest_disparity,
+            has_disparity=self.has_disparity,
             disparity_under_cursor=self._disparity_under_cursor(),
             captured_here=self.captured_here,
             inputs=self._inputs(),
@@ -422,14 +429,15 @@ class Controller:
         source = self.state.comparison.source
         if source is Source.CAPTURED:
             return self.captured_here is not None
-        return self._newest_disparity if source is Source.INSTANT else self.comparing.answer is not None
+        return self.has_disparity if source is Source.INSTANT else self.comparing.answer is not None
 
     @property
     def _shows_captured(self) -> bool:
         return self.state.captured and self.state.look is Look.SYNTHESIS and self.captured_here is not None
 
     @property
-    def _newest_disparity(self) -> bool:
+    def has_disparity(self) -> bool:
+        """Whether the synthesis on screen has a disparity map."""
         return self.newest is not None and self.newest.synthesis.disparity is not None
 
     def _take(self, opened: LightField | Exhibition | None) -> None:
@@ -469,14 +477,19 @@ class Controller:
 
     def _collect(self) -> None:
         for loaded in self._loading.news():
+            self.unsay(self._not_opened)  # something else has been tried since
+            self._not_opened = None
             if isinstance(loaded, Preview):
                 self._take(loaded.light_field)
                 self.previewing = True
             elif isinstance(loaded, NotOpened):
                 if self.previewing:
                     self._take(None)
+                self._not_opened = loaded.message
                 self.say(loaded.message)
             elif isinstance(loaded, Folder):
+                if self.previewing:  # of what was given up for this
+                    self._take(None)
                 self.folder = loaded
                 self.state.desk.show(Card.BROWSER)
             else:
@@ -484,7 +497,10 @@ class Controller:
         for answered in self._asking.news():
             if isinstance(answered, NotAnswered):
                 self.say(answered.message)
-                self._faulted = True
+                if answered.wish is not None and answered.wish == self.comparing.wish():
+                    self.comparing.give_up()
+                else:
+                    self._faulted = True
             elif self.light_field is not None:
                 self._count(self.light_field)
                 if answered.answer is None:

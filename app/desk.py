@@ -81,6 +81,10 @@ class Folder:
     path: Path | None
     members: tuple[Path, ...]
 
+    def member_with(self, path: Path) -> int | None:
+        """Number of the member that is this path, or holds it, or None."""
+        return next((number for number, each in enumerate(self.members) if path == each or each in path.parents), None)
+
 
 @dataclass(frozen=True)
 class Shelf:

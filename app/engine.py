@@ -349,7 +349,12 @@ class Engine:
         """Whether a view by the model for a hand at rest does."""
         if self._store is None or self._final.failure is not None:
             return False
-        key = cache_key(light_field, self._final.prepare(), u, v)
+        try:
+            synthesizer = self._final.prepare()
+        except LfviewError:
+            self._final.failure = None  # it is tried again, and what is wrong said, when a view by it is asked for
+            return False
+        key = cache_key(light_field, synthesizer, u, v)
         if self._stored_of != (key.content, key.model):
             self._list_stored(key)
         return (key.u, key.v) in self._stored

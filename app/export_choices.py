@@ -9,6 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from app.readable import readable
+from app.typed_paths import expanded
 from assets import sample_path
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
@@ -202,14 +204,15 @@ class ExportChoices:
         source = Path(opened).absolute()
         effective = os.access in os.supports_effective_ids
         beside = os.access(source.parent, os.W_OK, effective_ids=effective) and source != sample_path()
-        self.folder = str(source.parent if beside else Path.home())
-        self.name = f"{name} sweep"
+        folder = str(source.parent if beside else Path.home())
+        self.folder = folder if folder == readable(folder) else str(Path.home())  # a field holds texts only
+        self.name = readable(f"{name} sweep")
         self.playing = False
 
     @property
     def target_path(self) -> Path:
-        """The file or folder that is made, before a quilt's name gets its ending."""
-        folder = Path(self.folder).expanduser()
+        """The file or folder that is made, before a quilt's name gets its ending. Raises InputError as `expanded`."""
+        folder = expanded(self.folder)
         if self.product is Product.SWEEP:
             return folder / f"{self.name}{self.format.extension}"
         return folder / (self.name if self.product is Product.VIEWS else f"{self.name}.png")
@@ -218,6 +221,13 @@ class ExportChoices:
     def quilt(self) -> Quilt:
         """The quilt that is chosen."""
         return Quilt(self.columns, self.rows, focus=self.focus[0] if self.refocus else 0.0)
+
+    @property
+    def is_folder(self) -> bool:
+        """Whether a folder is made, not a file."""
+        if self.product is Product.SWEEP:
+            return self.format.kind is not Kind.VIDEO
+        return self.product is Product.VIEWS
 
     def made(self, view: tuple[int, int]) -> Path:
         """The file or folder that is made of views of that (width, height)."""
@@ -232,14 +242,15 @@ class ExportChoices:
     @property
     def fault(self) -> str:
         """Why it cannot be exported as chosen; empty where it can."""
-        if not self.name.strip() or "/" in self.name or "\0" in self.name:
+        if not self.name.strip() or "/" in self.name or "\0" in self.name or self.name.strip() in (".", ".."):
             return "Give the export a name without slashes."
-        if self.product is Product.SWEEP:
-            try:
+        try:
+            if self.product is Product.SWEEP:
                 check_fits(self.plan(), self.format.kind)
-            except InputError as error:
-                return str(error)
-        return ""
+            expanded(self.folder)
+        except InputError as error:
+            return str(error)
+        return "" if self.folder.strip() and "\0" not in self.folder else "Give the folder in which the export is to lie."
 
 
 @lru_cache(maxsize=16)

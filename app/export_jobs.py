@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -94,9 +95,9 @@ def sweep_job(plan: SweepPlan, target: Target, source: Source) -> Job:
     return Job(title, target.path, plan.frames, partial(_write_sweep, plan, target, source))
 
 
-def picture_job(pixels: npt.NDArray[np.uint8], folder: Path, stem: str) -> Job:
-    """The picture as shown, uint8 (H, W, 3), as PNG under a name that is not taken yet."""
-    target = free_name(folder, stem, ".png")
+def picture_job(pixels: npt.NDArray[np.uint8], folder: Path, stem: str, taken: Collection[Path]) -> Job:
+    """The picture as shown, uint8 (H, W, 3), as PNG under a name that is not taken yet, nor will be by jobs that wait."""
+    target = free_name(folder, stem, ".png", taken)
 
     def write(done: Done, cancelled: Cancel) -> None:
         write_picture(target, pixels)
@@ -105,11 +106,12 @@ def picture_job(pixels: npt.NDArray[np.uint8], folder: Path, stem: str) -> Job:
     return Job("Picture as shown", target, 1, write)
 
 
-def free_name(folder: Path, stem: str, extension: str) -> Path:
-    """A path in the folder that does not exist: the stem, or the stem and a number. Raises OutputError where all are taken."""
+def free_name(folder: Path, stem: str, extension: str, taken: Collection[Path] = ()) -> Path:
+    """A path in the folder that does not exist and is not `taken`: the stem, or the stem and a number. Raises OutputError where
+    all are."""
     for number in range(1, _MOST_NAMES):
         path = folder / (f"{stem}{extension}" if number == 1 else f"{stem} {number}{extension}")
-        if not path.exists():
+        if path not in taken and not os.path.lexists(path):
             return path
     raise OutputError(f"{folder} holds {_MOST_NAMES} pictures named {stem}; choose another folder.")
 

@@ -15,6 +15,8 @@ from app.engine import ModelChoice
 from app.export_choices import ExportChoices
 from app.export_requests import CancelExport, ExportAction, ExportRequest
 from app.exporting import ExportQueue, Phase, Status
+from app.readable import readable
+from app.typed_paths import expanded
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
 from lfcore.sweep_plan import load_plan, save_plan
@@ -46,6 +48,11 @@ class Exports:
         return self._queue.statuses
 
     @property
+    def _targets(self) -> frozenset[Path]:
+        """Of the jobs that are not over."""
+        return frozenset(status.target for status in self.statuses if not status.phase.over)
+
+    @property
     def busy(self) -> bool:
         """Whether something is being exported."""
         return self._queue.busy
@@ -62,10 +69,10 @@ class Exports:
         statuses = self.statuses
         running = next((status for status in statuses if status.phase is Phase.RUNNING), None)
         if running is not None:
-            return f"exporting {running.target.name}, {running.done} of {running.total}"
+            return f"exporting {readable(running.target.name)}, {running.done} of {running.total}"
         last = statuses[-1] if statuses else None
         if last is not None and last.phase is Phase.DONE and now - last.ended < _SHOWN_SECONDS:
-            return f"written: {last.target.name}"
+            return f"written: {readable(last.target.name)}"
         return ""
 
     def fulfil(self, request: ExportRequest, choices: ExportChoices, light_field: LightField | None, model: str) -> None:
@@ -85,10 +92,10 @@ class Exports:
             self._begin(choices, light_field, choices.model or model)
 
     def save_picture(self, pixels: npt.NDArray[np.uint8], choices: ExportChoices, stem: str) -> None:
-        """Write the picture as shown, uint8 (H, W, 3), into the folder of the exports."""
+        """Write the picture as shown, uint8 (H, W, 3), into the folder of the exports. LfviewError where it cannot be."""
         from app.export_jobs import picture_job
 
-        self._queue.add(picture_job(pixels, Path(choices.folder).expanduser(), stem))
+        self._queue.add(picture_job(pixels, expanded(choices.folder), stem, self._targets))
 
     def follow_dialog(self, choices: ExportChoices) -> None:
         """Take the folder that was chosen in the dialog, once it has been."""
@@ -102,9 +109,12 @@ class Exports:
             choices.folder, choices.name = str(answer.path.parent), answer.path.name.removesuffix(choices.target_path.suffix)
         else:
             choices.folder = str(answer.path)
+        choices.folder, choices.name = readable(choices.folder), readable(choices.name)
 
     def stop(self, timeout: float) -> None:
         """End the thread; what is not finished is given up."""
+        if self._dialog is not None:
+            self._dialog.close()
         self._queue.stop(timeout)
 
     def _ask_place(self, choices: ExportChoices) -> None:
@@ -114,12 +124,12 @@ class Exports:
         if not dialogs.available():
             raise InputError("This system has no dialog for folders (zenity or kdialog): type the folder's path.")
         target = choices.target_path
-        if target.suffix:
+        if not choices.is_folder:
             self._asked = dialogs.Purpose.SAVE_FILE
             question = dialogs.Question(self._asked, "Export to", target, target.suffix[1:], (f"*{target.suffix}",))
         else:  # a folder of frames or views
             self._asked = dialogs.Purpose.OPEN_FOLDER
-            question = dialogs.Question(self._asked, "Folder for exports", Path(choices.folder).expanduser())
+            question = dialogs.Question(self._asked, "Folder for exports", expanded(choices.folder))
         try:
             self._dialog = dialogs.ask(question, self._wake)
         except OSError as error:
@@ -143,12 +153,12 @@ class Exports:
 
 
 def plan_file(choices: ExportChoices) -> Path:
-    """Where the sweep is saved as JSON: beside the export, under its name."""
-    return Path(choices.folder).expanduser() / f"{choices.name}.json"
+    """Where the sweep is saved as JSON: beside the export, under its name. Raises InputError as `expanded`."""
+    return expanded(choices.folder) / f"{choices.name}.json"
 
 
 def take_plan(path: Path, choices: ExportChoices) -> None:
     """Choose what a saved sweep says. Raises InputError where it is none."""
     plan = load_plan(path)
     choices.take(plan)
-    choices.name = path.stem
+    choices.name = readable(path.stem)

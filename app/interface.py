@@ -8,8 +8,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from urllib.parse import unquote, urlparse
 
 import moderngl
 import numpy as np
@@ -19,7 +17,7 @@ from app import painting, panel_painting, panels, repainting, theme
 from app.canvas import Canvas, Colours, Frame, Pixels, Sheets, Target, WindowCopy, draws_in_software, spread_rasteriser
 from app.canvas.atlas import Atlas
 from app.canvas.slices import Slicing
-from app.commands import Action, OpenPath, Request
+from app.commands import Action, OpenPath, OpenTyped, Request
 from app.comparing import Comparing
 from app.comparison import Source
 from app.controller import Controller
@@ -37,12 +35,14 @@ from app.settings import Theme
 from app.shared_window import SharedWindow
 from app.state import CARRIED, CARRIED_IN_SOFTWARE, Look, Step
 from app.surroundings import Surroundings
+from app.typed_paths import path_from_text
 from assets import sample_path
-from lfcore.errors import LfviewError
+from lfcore.errors import InputError, LfviewError
 from lfcore.lightfield import CORNERS, FloatArray, LightField
 
 GLSL_VERSION = "#version 330 core"
 DIMMED = 0.35
+_GIVEN_UP = "Something is still being exported and would be given up; Ctrl+Q, or closing the window, once more ends lfview."
 FAULTS_TO_CLOSE, FAULTS_TO_END = 3, 30  # frames in a row that fail
 
 _log = logging.getLogger(__name__)
@@ -251,7 +251,9 @@ class Interface:
     def _fulfil(self, request: Request) -> None:
         controller = self.controller
         if isinstance(request, OpenPath):
-            controller.open(path_from_text(request.text))
+            controller.open(request.path)
+        elif isinstance(request, OpenTyped):
+            self._open_typed(request.text)
         elif request is Action.OPEN_SAMPLE:
             controller.open(sample_path())
         elif request is Action.CLOSE:
@@ -261,11 +263,25 @@ class Interface:
         elif request is Action.DISMISS:
             controller.dismiss()
         elif request is Action.QUIT:
-            self.closing = True
+            self.quit()
         elif isinstance(request, (ExportAction, CancelExport)):
             self._export(request)
         else:
             self.surroundings.fulfil(request)
+
+    def quit(self) -> None:
+        """End the program after this frame; while something is exported, only when it is asked for once more."""
+        controller = self.controller
+        if controller.exports.busy and _GIVEN_UP not in controller.messages:
+            controller.say(_GIVEN_UP)
+        else:
+            self.closing = True
+
+    def _open_typed(self, text: str) -> None:
+        try:
+            self.controller.open(path_from_text(text))
+        except InputError as error:
+            self.controller.say(str(error))
 
     def _change_theme(self) -> None:
         chosen = self.controller.state.desk.theme
@@ -283,6 +299,9 @@ class Interface:
         controller = self.controller
         if request is ExportAction.SAVE_PICTURE:
             self._saving = True
+            return
+        if request is ExportAction.EXPORT and controller.previewing:
+            controller.say("The light field is still being opened; export it once it is there.")
             return
         model = controller.readout(None).model
         try:
@@ -466,7 +485,7 @@ class Interface:
         mapped = not comparison.difference.measured or self._map is not None
         if look is Look.ERROR and not (controller.has_partner and mapped):
             look, dim = Look.SYNTHESIS, DIMMED
-        if look.needs_disparity and not self._canvas.has_disparity:
+        if look.needs_disparity and not controller.has_disparity:
             look, dim = Look.SYNTHESIS, DIMMED
         return Frame(
             look,
@@ -544,13 +563,3 @@ def _scaled(area: Rect, pixels: float) -> Rect:
 def _magnified(placement: Placement, pixels: float) -> Placement:
     """The same for a placement."""
     return Placement(placement.scale * pixels, (placement.origin[0] * pixels, placement.origin[1] * pixels))
-
-
-def path_from_text(text: str) -> Path:
-    """The path that was typed, pasted or dropped: quotes, file:// and ~ are understood."""
-    text = text.strip()
-    if len(text) >= 2 and text[0] == text[-1] and text[0] in "'\"":
-        text = text[1:-1]
-    if text.startswith("file://"):
-        text = unquote(urlparse(text).path)
-    return Path(text).expanduser()

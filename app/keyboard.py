@@ -32,6 +32,7 @@ _KEYS: dict[str, tuple[imgui.Key, ...]] = {
 _CHARACTERS = frozenset("?+=-,./[]")
 _SCROLLING = frozenset(("Up", "Down", "PgUp", "PgDn"))  # the page of keys, while it is shown
 _WHILE_TYPING = frozenset(("Esc", "F1"))
+_OF_FIELDS = frozenset(("Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+Y"))  # undo what was typed in a field of text
 _REPEATING = frozenset(("Left", "Right", "Up", "Down", "PgUp", "PgDn"))
 _ALL = tuple(dict.fromkeys(key for keys in _KEYS.values() for key in keys))
 
@@ -40,6 +41,8 @@ def run_pressed(context: commands.Context) -> None:
     """Run every command whose key goes down (or repeats) in this frame; while a text is typed or a card
     takes the keys, only with Ctrl, Esc, F1."""
     io = imgui.get_io()
+    if io.app_focus_lost:
+        _release_all(context)
     typing = io.want_text_input or context.state.path_field or context.state.desk.card is not None
     typed = "" if typing else "".join(map(chr, io.input_queue_characters))
     if not typed and not any(imgui.is_key_down(key) or imgui.is_key_released(key) for key in _ALL):
@@ -50,6 +53,13 @@ def run_pressed(context: commands.Context) -> None:
         if any(_pressed(key, typed, typing, held) for key in keys) and not io.key_alt:
             commands.run(name, context)
         if command.released is not None and any(imgui.is_key_released(key) for cap in command.keys for key in _KEYS[cap]):
+            command.released(context)
+
+
+def _release_all(context: commands.Context) -> None:
+    """Let go of all keys that do something while they are held: another window hears when they come up."""
+    for command in commands.COMMANDS.values():
+        if command.released is not None:
             command.released(context)
 
 
@@ -71,6 +81,8 @@ def _pressed(name: str, typed: str, typing: bool, held: _Held) -> bool:
     ctrl, shift, cap = "Ctrl+" in name, "Shift+" in name, name.rsplit("+", 1)[-1]
     shifted = held.shift and cap != "Plus"  # which has its key to itself on some keyboards, and needs Shift on others
     if (held.ctrl, shifted) != (ctrl, shift) or (typing and not held.ctrl and name not in _WHILE_TYPING):
+        return False
+    if name in _OF_FIELDS and imgui.get_io().want_text_input:
         return False
     return any(imgui.is_key_pressed(key, cap in _REPEATING) for key in _KEYS[cap])
 

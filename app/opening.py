@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from app.desk import Folder
 from app.engine import Engine, ModelChoice
 from app.exhibits import Exhibition, open_exhibition
+from app.readable import readable
 from assets import weights_path
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
@@ -98,10 +99,15 @@ def synthesis_process() -> SynthesisProcess:
 def make_engine(model: str, cache_bytes: int, process: SynthesisProcess, store: ViewStore | None = None) -> Engine:
     """The engine on the named model or weight file. While the hand moves, the small networks stand in for larger ones."""
     quick = (lambda: RemoteSynthesizer(process, QUICK)) if weights_path(QUICK).is_file() else None
-    choice, name = _choice(model, process), Path(model).name
+    choice, name = _choice(model, process), model_name(model)
     engine = Engine(choice.make, cache_bytes, quick, store, name, choice.scored)
     engine.use(name, choice)
     return engine
+
+
+def model_name(model: str) -> str:
+    """By which a model, named or a weight file, is known in the window."""
+    return readable(Path(model).name)
 
 
 def is_slow(model: str) -> bool:
@@ -112,7 +118,7 @@ def is_slow(model: str) -> bool:
 def offered_models(model: str, process: SynthesisProcess) -> dict[str, ModelChoice]:
     """The models to choose from in the window, by name: the shipped ones, and the one that the program was started with."""
     names = dict.fromkeys([*SHIPPED, model])
-    return {Path(name).name: _choice(name, process) for name in names}
+    return {model_name(name): _choice(name, process) for name in names}
 
 
 def _choice(model: str, process: SynthesisProcess) -> ModelChoice:

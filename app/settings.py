@@ -26,6 +26,7 @@ SIZE_LIMIT = 2**20  # bytes; a file of settings that is larger is none
 SCALE_LIMITS = (1.0, 3.0)
 _TEXT_LIMIT = 4096  # characters of a path or a key
 _LOOK_LIMIT = 4096  # bytes, as JSON, of what is kept for one file
+_LOOK_DEPTH = 8  # of objects and lists in one another
 
 
 class Theme(Enum):
@@ -117,7 +118,12 @@ class SettingsFile:
             self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             with atomic_path(self.path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
-        except (OSError, OutputError) as error:
+        except OSError as error:
+            self._writable = False
+            raise OutputError(
+                f"Settings are not kept from now on: {self.path} cannot be written ({error.strerror or error})."
+            ) from error
+        except OutputError as error:
             self._writable = False
             raise OutputError(f"Settings are not kept from now on: {error}") from error
         self._stored = text
@@ -142,8 +148,25 @@ def _bounded(settings: Settings) -> Settings:
         window = None
     if scale is not None:
         scale = within(scale, SCALE_LIMITS)
-    recent = tuple(dict.fromkeys(path for path in settings.recent if 0 < len(path) <= _TEXT_LIMIT))[:RECENT_LIMIT]
-    usable = [
-        (key, look) for key, look in settings.files.items() if len(key) <= _TEXT_LIMIT and len(json.dumps(look)) <= _LOOK_LIMIT
-    ]
-    return replace(settings, window=window, scale=scale, recent=recent, files=dict(usable[-FILES_LIMIT:]))
+    model = settings.model if _is_path(settings.model) else ""
+    recent = tuple(dict.fromkeys(filter(_is_path, settings.recent)))[:RECENT_LIMIT]
+    usable = [(key, look) for key, look in settings.files.items() if len(key) <= _TEXT_LIMIT and _is_look(look)]
+    return replace(settings, window=window, scale=scale, model=model, recent=recent, files=dict(usable[-FILES_LIMIT:]))
+
+
+def _is_path(text: str) -> bool:
+    """Whether the system could have a file of this name."""
+    try:
+        return 0 < len(text) <= _TEXT_LIMIT and b"\0" not in os.fsencode(text)
+    except UnicodeEncodeError:
+        return False
+
+
+def _is_look(look: Json) -> bool:
+    """Whether this is no larger than what is kept for one file, in either way."""
+    return _is_shallow(look, _LOOK_DEPTH) and len(json.dumps(look)) <= _LOOK_LIMIT
+
+
+def _is_shallow(data: Json, levels: int) -> bool:
+    inner = data.values() if isinstance(data, Mapping) else data if isinstance(data, list | tuple) else ()
+    return all(levels > 0 and _is_shallow(each, levels - 1) for each in inner)

@@ -85,6 +85,7 @@ class Surroundings:
         self._gallery = Gallery(keeping.thumbnails, wake)
         self._history = History()
         self._watching = Watching(wake)
+        self._change: str | None = None  # what has last been said of the open file
         self._dialog: dialogs.Dialog | None = None
         self._wake = wake
         self._lister: LatestWorker[Folder] = LatestWorker("folders", wake)
@@ -134,6 +135,7 @@ class Surroundings:
         self._follow_saver()
         change = self._watching.news()
         if change is not None:
+            self._change = change
             self.controller.say(change)
         self.arrive()
         controller = self.controller
@@ -149,6 +151,7 @@ class Surroundings:
         if opened is self._open or controller.previewing:
             return
         self.settings = self._with_open_file()
+        self.controller.unsay(self._change)  # it was about what has been open until now
         before, left = self._open, self._left
         self._open, self._left = opened, None
         self._watching.follow(Path(opened.source).absolute() if opened is not None else None)
@@ -201,7 +204,7 @@ class Surroundings:
         elif request is Action.REOPEN:
             opened = self.controller.light_field or self.controller.exhibition
             if opened is not None:
-                self.controller.open(Path(opened.source))
+                self.controller.open(Path(opened.source).absolute())
         elif request is Action.FORGET:
             self.settings = replace(self.settings, recent=(), files={})
             self._left = None
@@ -252,12 +255,13 @@ class Surroundings:
         return Path(self.settings.recent[0]) if self.settings.recent else None
 
     def _browse(self, folder: Path | None) -> None:
-        if folder is None and self.controller.folder is not None:
+        source = self._source()
+        listed = self.controller.folder
+        if folder is None and listed is not None and (source is None or listed.member_with(source) is not None):
             self._gallery.forget()
-            folder = self.controller.folder.path
+            folder = listed.path
             if folder is None:
                 return
-        source = self._source()
 
         def job(cancelled: Cancel) -> Folder:
             if folder is not None:
@@ -281,8 +285,10 @@ class Surroundings:
     def _show(self, folder: Folder) -> None:
         self.controller.folder = folder
         desk = self.controller.state.desk
-        desk.card = None  # so that the choice begins with the first
+        desk.card = None  # so that the choice begins anew
         desk.show(Card.BROWSER)
+        source = self._source()
+        desk.chosen = (source is not None and folder.member_with(source)) or 0
 
     # Settings.
 
@@ -291,6 +297,7 @@ class Surroundings:
         self._note()
         changed = self.settings is not self._saved or self._with_open_file() is not self.settings
         if not changed or self._file is None:
+            self._save_at = None  # what had changed has been taken back
             return
         if self._save_at is None:
             self._save_at = now + SAVE_SECONDS

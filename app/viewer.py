@@ -25,7 +25,16 @@ from app.engine import Engine, ModelChoice
 from app.frametimes import FrameTimes
 from app.geometry import Rect
 from app.interface import Interface
-from app.opening import DEFAULT_MODEL, make_engine, offered_models, open_by_content, preview, synthesis_process, thumbnail_store
+from app.opening import (
+    DEFAULT_MODEL,
+    make_engine,
+    model_name,
+    offered_models,
+    open_by_content,
+    preview,
+    synthesis_process,
+    thumbnail_store,
+)
 from app.pacing import Pace
 from app.settings import SettingsFile, WindowPlace, default_path
 from app.shared_window import SharedWindow
@@ -77,7 +86,7 @@ def run_viewer(
     with synthesis_process() as process:
         process.start()  # it loads torch while the window and the light field are opened
         engine = make_engine(chosen, cache_mib * MEBIBYTE, process, store)
-        show(path, engine, Path(chosen).name, foresight, offered_models(chosen, process), keeping)
+        show(path, engine, model_name(chosen), foresight, offered_models(chosen, process), keeping)
     return 0
 
 
@@ -93,8 +102,7 @@ def show(
 
     models: to choose from. keeping: what was kept from the last run, and where things are kept.
     """
-    with _window(engine, model, models, keeping) as (window, controller):
-        controller.state.foresight = foresight and controller.state.foresight
+    with _window(engine, model, models, keeping, foresight) as (window, controller):
         window.draw()  # the first frame, before anything slow is imported
         if path is not None:
             controller.open(path)
@@ -119,11 +127,16 @@ def measure_frames(path: Path, seconds: float, model: str = "full") -> FrameTime
 
 @contextmanager
 def _window(
-    engine: Engine, model: str, models: Mapping[str, ModelChoice] | None = None, keeping: Keeping | None = None
+    engine: Engine,
+    model: str,
+    models: Mapping[str, ModelChoice] | None = None,
+    keeping: Keeping | None = None,
+    foresight: bool = True,
 ) -> Iterator[tuple[_Window, Controller]]:
     """A window with a controller; at the end the window vanishes first, then the threads are waited for."""
     window = _Window(keeping.settings.window if keeping is not None else None)
     controller = Controller(engine, open_by_content, wake=window.wake, model=model, preview=preview, models=models)
+    controller.state.foresight = foresight  # before what is kept: it is none of the person's choices
     surroundings = Surroundings(controller, window.wake, keeping)
 
     def stop() -> None:
@@ -211,6 +224,7 @@ class _Window:
             follow(self._window, self._resized)
         self._resized()
         glfw.set_window_refresh_callback(self._window, self._uncovered)
+        glfw.set_window_close_callback(self._window, self._asked_to_close)
         glfw.set_drop_callback(self._window, self._dropped)  # type: ignore[arg-type]  # its stub is wrong
         imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
 
@@ -378,6 +392,13 @@ class _Window:
         content = max(glfw.get_window_content_scale(self._window))
         self._units = glfw.get_window_size(self._window)
         self._scale = content * max(self._units[0], 1) / max(self._size[0], 1) or 1.0
+
+    def _asked_to_close(self, *_: object) -> None:
+        """Its button was pressed: as the key that quits."""
+        if self._interface is not None:
+            glfw.set_window_should_close(self._window, False)
+            self._interface.quit()
+            self._touched()
 
     def _uncovered(self, *_: object) -> None:
         """A part of the window has come into sight."""

@@ -11,6 +11,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app import commands, theme
 from app.geometry import Rect
 from app.limits import within
+from app.readable import readable
 
 # Nothing but its contents.
 BARE = (
@@ -99,7 +100,7 @@ def font(face: imgui.ImFont, size: float = theme.FONT_SIZE) -> Iterator[None]:
 def text(words: str, colour: ImVec4 = theme.TEXT) -> None:
     """A line of text, as it stands."""
     imgui.push_style_color(imgui.Col_.text, colour)
-    imgui.text_unformatted(words)
+    imgui.text_unformatted(readable(words))
     imgui.pop_style_color()
 
 
@@ -107,7 +108,7 @@ def wrapped(words: str, colour: ImVec4 = theme.TEXT) -> None:
     """Text broken into lines at the window's edge."""
     imgui.push_style_color(imgui.Col_.text, colour)
     imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(words)
+    imgui.text_unformatted(readable(words))
     imgui.pop_text_wrap_pos()
     imgui.pop_style_color()
 
@@ -129,7 +130,7 @@ def tooltip(words: str) -> None:
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(em() * 0.6, em() * 0.45))
         if imgui.begin_tooltip():
             imgui.push_text_wrap_pos(em() * 22)
-            imgui.text_unformatted(words)
+            imgui.text_unformatted(readable(words))
             imgui.pop_text_wrap_pos()
             imgui.end_tooltip()
         imgui.pop_style_var()
@@ -294,6 +295,7 @@ def tag(words: str, colour: ImVec4, x: float, y: float, width: float) -> None:
 
 def elided(words: str, width: float) -> str:
     """The words, their middle left out where they are wider than `width`."""
+    words = readable(words)
     if imgui.calc_text_size(words).x <= width:
         return words
     low, high = 0, len(words)

@@ -12,10 +12,10 @@ _LEAST_IN_SIGHT = 0.5  # of the window's area
 
 def fitted(place: WindowPlace, monitors: Sequence[Rect]) -> tuple[int, int, int, int]:
     """x, y, width and height for the window: as it was where half of it would be in sight, else in the middle of the first
-    monitor, no larger than that. `monitors`: the free area of each, at least one."""
+    monitor, no larger than that; as it was where there is no monitor. `monitors`: the free area of each."""
     window = Rect(place.x, place.y, place.width, place.height)
     in_sight = sum(_overlap(window, monitor) for monitor in monitors)
-    if in_sight >= _LEAST_IN_SIGHT * window.width * window.height:
+    if not monitors or in_sight >= _LEAST_IN_SIGHT * window.width * window.height:
         return place.x, place.y, place.width, place.height
     first = monitors[0]
     width, height = min(place.width, round(first.width)), min(place.height, round(first.height))

@@ -22,7 +22,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from lfcore.errors import Cancelled, InputError, LfviewError
+from lfcore.errors import Cancelled, InputError, LfviewError, WeightsError
 from lfcore.lightfield import CORNERS, LightField
 from lfcore.remote_messages import (
     Cancel,
@@ -121,15 +121,18 @@ class SynthesisProcess:
     def synthesize(
         self,
         model: str,
+        key: str,
         light_field: LightField,
         at: tuple[float, float],
         cancelled: Callable[[], bool],
         *,
         weighed: bool,
     ) -> Synthesis:
-        """The view at (u, v), with weights where that is wished and the model has them; see WeighingSynthesizer.
+        """The view at (u, v) by the model of that name and key, with weights where that is wished and it has them; see
+        WeighingSynthesizer.
 
-        Raises what the synthesizer raises, and LfviewError if the process has ended by itself.
+        Raises what the synthesizer raises, LfviewError if the process has ended by itself, and WeightsError where the model's
+        file is another than that of this key: its views would be taken for those of the other.
         """
         u, v = at
         while not self._lock.acquire(timeout=_CANCEL_SECONDS):
@@ -137,6 +140,8 @@ class SynthesisProcess:
                 raise Cancelled
         try:
             made = self._loaded(model)
+            if made.key != key:
+                raise WeightsError(f"{made.name} has been replaced since it was chosen; choose the model again, or start anew.")
             exchange = self._handed_over(light_field)
             self._number += 1
             finished = self._ask(Synthesize(self._number, model, u, v, weighed), Finished, cancelled)
@@ -204,12 +209,18 @@ class SynthesisProcess:
             return self._connection
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        self._process = context.Process(
-            target=serve, args=(theirs, self._make, self._niceness), name="lfview synthesis", daemon=True
-        )
-        self._process.start()
-        theirs.close()  # so that the pipe breaks when the process ends
-        self._connection = ours
+        process = context.Process(target=serve, args=(theirs, self._make, self._niceness), name="lfview synthesis", daemon=True)
+        try:
+            process.start()
+        except OSError as error:
+            ours.close()
+            reason = error.strerror or error
+            raise LfviewError(
+                f"The process that synthesizes views could not be started ({reason}); close other programs."
+            ) from error
+        finally:
+            theirs.close()  # so that the pipe breaks when the process ends
+        self._process, self._connection = process, ours
         return ours
 
     def _why_ended(self) -> str:
@@ -275,7 +286,7 @@ class RemoteSynthesizer:
     def _asked(self, at: tuple[float, float], cancelled: Callable[[], bool], weighed: bool) -> Synthesis:
         if self._light_field is None:
             raise InputError("No light field is set; call set_light_field first.")
-        return self._process.synthesize(self._model, self._light_field, at, cancelled, weighed=weighed)
+        return self._process.synthesize(self._model, self.key, self._light_field, at, cancelled, weighed=weighed)
 
 
 def _shared_memory(size: int) -> SharedMemory:

@@ -199,8 +199,10 @@ def from_json(value: object) -> SweepPlan:
 def is_plan_file(path: Path) -> bool:
     """Whether a file's name and beginning are those of a saved sweep."""
     try:
+        if path.suffix.lower() != ".json" or not path.is_file():  # a pipe would be waited for
+            return False
         with path.open("rb") as file:
-            return path.suffix.lower() == ".json" and f'"{_KEY}"'.encode() in file.read(4096)
+            return f'"{_KEY}"'.encode() in file.read(4096)
     except OSError:
         return False
 

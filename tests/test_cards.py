@@ -154,7 +154,7 @@ def test_keys_choose_and_open_a_light_field(screen: Screen) -> None:
     columns = screen.state.desk.chosen - 1
     assert columns > 1
     key(screen, "enter")
-    assert screen.requests[-1] == OpenPath(str(MEMBERS[columns + 1]))
+    assert screen.requests[-1] == OpenPath(MEMBERS[columns + 1])
     assert (screen.state.u, screen.state.v) == (0.5, 0.5)
     key(screen, "end")
     assert screen.state.desk.chosen == len(MEMBERS) - 1
@@ -180,7 +180,7 @@ def test_a_click_opens_a_light_field(screen: Screen) -> None:
     browse(screen)
     area = screen.layout.picture
     screen.click(area.x + 30 + tiles.size().x * 1.5, area.y + 140)
-    assert screen.requests[-1] == OpenPath(str(MEMBERS[1]))
+    assert screen.requests[-1] == OpenPath(MEMBERS[1])
 
 
 # Settings.
@@ -260,7 +260,7 @@ def test_recent_files_are_shown_those_that_are_gone_last(screen: Screen) -> None
         for x in range(200, 1100, 60):
             screen.requests.clear()
             screen.click(x, y)
-            opened += [each.text for each in screen.requests if isinstance(each, OpenPath)]
+            opened += [str(each.path) for each in screen.requests if isinstance(each, OpenPath)]
     assert list(dict.fromkeys(opened)) == ["/first", "/second", "/gone"]
 
 
@@ -286,3 +286,23 @@ def test_every_card_is_drawn_at_any_size_and_scale(imgui_context: Any, size: tup
             screen.state.desk.card = card
             screen.frame(3)
             assert screen.state.desk.card is card
+
+
+def test_names_that_are_no_text_are_shown_as_far_as_they_are(screen: Screen) -> None:
+    """In the browser, as recent files, in messages, while one is being opened, and as the name of what is open."""
+    odd = Path("/scenes/caf\udce9")
+    seen = Thumbnail(reason=f"{odd} is damaged.")
+    shelf = Shelf((odd,), Folder(odd.parent, (odd, odd / "inside")), thumbnail=lambda path: seen)
+    screen.readout = replace(OPEN, shelf=shelf, messages=(f"{odd} is damaged.",), loading=0.5, loading_name=odd.name)
+    screen.press("Ctrl+B")
+    screen.frame(3)
+    screen.press("Enter")
+    assert screen.requests[-1] == OpenPath(odd)
+    screen.readout = replace(screen.readout, grid=None)
+    screen.state.desk.card = None
+    screen.frame(3)
+    screen.readout = replace(OPEN, name="caf\udce9", source=str(odd))
+    screen.frame(3)
+    assert screen.layout.panel is not None
+    screen.move(screen.layout.panel.x + 30, screen.layout.panel.y + 20)
+    screen.frame(60)  # the tooltip

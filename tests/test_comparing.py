@@ -16,7 +16,7 @@ from app.controller import Controller
 from app.engine import Engine, ModelChoice
 from app.foresight import captured_viewpoints
 from app.state import Look, Step, Tab
-from lfcore.errors import WeightsError
+from lfcore.errors import LfviewError, WeightsError
 from lfcore.lightfield import FloatArray
 from lfcore.metrics import k16, luma_score, similarity_map, to_uint8
 from lfcore.store import ViewStore
@@ -310,3 +310,28 @@ def test_another_protocol_scores_everything_anew_without_synthesizing_anything(p
     program.compare(rule="a rule of long ago")
     program.tick()
     assert scores(program) == before  # K16 again, and kept
+
+
+def test_a_partner_that_fails_is_not_asked_again_here_and_holds_nothing_else_up() -> None:
+    class Failing(Shifted):
+        def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = lambda: False) -> Synthesis:
+            self.asked.append((u, v))
+            raise LfviewError("Not this one.")
+
+    program = Program()
+    failing = program.models["second"] = Failing("second", 0.0)
+    program.controller.stop()
+    choices = {name: ModelChoice(lambda made=made: made, False) for name, made in program.models.items()}  # type: ignore[misc]
+    engine = Engine(choices["first"].make, 64 * 2**20, None, None, "first")
+    program.controller = Controller(engine, lambda *_: light_field(), lambda: None, "first", models=choices)
+    program.state = program.controller.state
+    try:
+        program.open()
+        program.compare(partner="second")
+        program.until(lambda: bool(program.controller.messages))
+        program.until(lambda: len(program.controller.readout(None).cached) > 1)  # views are computed ahead
+        assert failing.asked == [(0.5, 0.5)]
+        program.state.move_to(0.3, 0.3)
+        program.until(lambda: len(failing.asked) == 2)
+    finally:
+        program.controller.stop()

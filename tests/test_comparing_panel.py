@@ -219,3 +219,14 @@ def test_every_way_of_comparing_draws_in_every_size(imgui_context: Any, size: tu
                     )
                     screen.move(size[0] / 3, size[1] / 3)
     assert imgui_context.get_draw_data().total_vtx_count > 0
+
+
+def test_a_key_that_is_held_while_another_window_takes_the_keys_is_let_go(screen: Screen) -> None:
+    hold(screen, "R", True)
+    assert screen.state.flipped
+    screen.io.add_focus_event(False)
+    screen.frame(2)
+    assert not screen.state.flipped
+    screen.io.add_focus_event(True)
+    screen.frame(2)
+    assert not screen.state.flipped

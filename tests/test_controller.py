@@ -664,3 +664,35 @@ def test_a_disk_that_cannot_be_written_is_said_once_and_the_viewer_goes_on(tmp_p
         assert program.controller.messages == []
     finally:
         program.controller.stop()
+
+
+def test_the_newest_message_is_on_top_and_goes_when_its_cause_is_gone(program: Program) -> None:
+    controller = program.controller
+    controller.say("first")
+    controller.say("second")
+    controller.say("first")
+    assert controller.messages == ["second", "first"]  # the last one is shown
+    controller.dismiss()
+    assert controller.messages == ["second"]
+    program.open("nothing")
+    program.open("nothing else")
+    assert controller.messages == ["second", "nothing else holds no views."]
+    program.open("3x3")
+    assert controller.messages == ["second"]
+
+
+def test_a_model_that_cannot_be_loaded_leaves_the_quick_one_to_serve_also_with_a_disk(tmp_path: Path) -> None:
+    def broken() -> TruthSynthesizer:
+        raise WeightsError("The weights of full are damaged; get them again.")
+
+    program = Program(TruthSynthesizer())
+    program.controller.stop()
+    engine = Engine(broken, 2**26, lambda: program.synthesizer, ViewStore(tmp_path, 2**26))
+    program.controller = Controller(engine, program.opened, lambda: None, "truth")
+    try:
+        program.open("3x3")
+        program.until(lambda: program.controller.picture is not None)
+        program.until(lambda: bool(program.controller.messages), 0.1)
+        assert program.controller.messages == ["The weights of full are damaged; get them again."]
+    finally:
+        program.controller.stop()

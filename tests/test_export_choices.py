@@ -57,11 +57,36 @@ def test_a_path_without_key_frames_is_a_fault_that_is_told() -> None:
     assert drawn_path(choices) == ()
     with pytest.raises(InputError):
         choices.plan()
-    assert "name" in ExportChoices(name=" ").fault
-    assert "name" in ExportChoices(name="a/b").fault
+    for name in (" ", "a/b", "a\0b", ".", ".."):
+        assert "name" in ExportChoices(name=name, folder="/tmp").fault
+    for folder in ("", "  ", "/tmp\0"):
+        assert "Give the folder" in ExportChoices(folder=folder).fault
+    assert "unknown here" in ExportChoices(folder="~nobody of this name/x").fault
     assert "leave out labels" in ExportChoices(format=Format.EXR, labels=True).fault
-    assert ExportChoices(format=Format.PNG, labels=True).fault == ""
-    assert ExportChoices().fault == ""
+    assert ExportChoices(format=Format.PNG, labels=True, folder="/tmp").fault == ""
+    assert ExportChoices(folder="/tmp").fault == ""
+    assert ExportChoices(folder="~").fault == ""
+
+
+@pytest.mark.parametrize(
+    ("product", "form", "is_folder"),
+    [
+        (Product.SWEEP, Format.MP4, False),
+        (Product.SWEEP, Format.EXR, True),
+        (Product.VIEWS, Format.MP4, True),
+        (Product.ESLF, Format.PNG, False),
+    ],
+)
+def test_a_dot_in_a_name_makes_no_file_of_a_folder(product: Product, form: Format, is_folder: bool) -> None:
+    assert ExportChoices(product=product, format=form, name="IMG_1.5 sweep", folder="/tmp").is_folder == is_folder
+
+
+def test_a_place_whose_name_is_no_text_is_not_suggested(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    folder.mkdir()
+    choices = ExportChoices()
+    choices.suggest(str(folder / "capture.lfp"), "caf\udce9")
+    assert choices.folder == str(Path.home()) and choices.name == "caf? sweep"
 
 
 def test_a_closed_path_is_drawn_back_to_its_beginning() -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from privileges import without_privileges
 
 from app import dialogs
 from app.controller import Controller
@@ -16,9 +19,11 @@ from app.engine import Engine, ModelChoice
 from app.export_choices import KEY_FRAMES, Format, Product
 from app.export_requests import CancelExport, ExportAction
 from app.exporting import Phase, Status
+from app.limits import within
 from app.sidebar.export import progress_words
 from app.state import Look, Tab
 from app.tone import Curve
+from app.widgets import typed
 from lfcore.errors import InputError
 from lfcore.key_frames import Stop
 from lfcore.sweep_plan import ShapePath, SweepPlan, load_plan, save_plan
@@ -314,3 +319,43 @@ def test_the_file_is_chosen_by_the_save_dialog(controller: Controller, tmp_path:
     ]
     controller.exports.follow_dialog(export)
     assert export.target_path == tmp_path / "videos" / "walk.mp4"
+
+
+@pytest.mark.parametrize("value", [math.nan, -math.nan, math.inf, -math.inf])
+def test_what_is_typed_and_no_number_changes_nothing(value: float) -> None:
+    assert typed(value, 24.0, (0.1, 100.0)) == 24.0
+    assert within(math.nan, (0.1, 100.0)) == 0.1
+    assert [typed(each, 24.0, (0.1, 100.0)) for each in (-3.0, 7.0, 1e30)] == [0.1, 7.0, 100.0]
+
+
+def test_the_size_of_a_saved_sweep_stays_whatever_it_is(screen: Screen) -> None:
+    for scale in (0.50001, 0.5, 1.0, 0.123456, 2.9999999):
+        screen.state.export.scale = scale
+        screen.frame(2)
+        assert screen.state.export.scale == scale
+
+
+def test_any_folder_and_any_name_can_be_typed(screen: Screen, tmp_path: Path) -> None:
+    export = screen.state.export
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    (closed / "inside").mkdir()
+    closed.chmod(0)
+    for folder in ("", "~nobody of this name", "~", str(closed / "inside"), "/proc/1/root/x", "a\0b"):
+        for name in ("sweep", "x" * 300, ".."):
+            export.folder, export.name = folder, name
+            with without_privileges():
+                screen.frame(2)
+    closed.chmod(0o700)
+
+
+def test_a_picture_that_cannot_be_written_is_said(controller: Controller, tmp_path: Path) -> None:
+    choices = controller.state.export
+    choices.folder = str(tmp_path)
+    controller.exports.save_picture(np.zeros((2, 2, 3), np.uint8), choices, "x" * 300)
+    wait_until(lambda: not controller.exports.busy, "the export", 60)
+    controller.tick(1.0)
+    assert "x" * 300 in controller.messages[0]
+    choices.folder = "~nobody of this name"
+    with pytest.raises(InputError, match="unknown here"):
+        controller.exports.save_picture(np.zeros((2, 2, 3), np.uint8), choices, "view")

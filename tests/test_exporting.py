@@ -212,6 +212,7 @@ def test_pictures_take_a_name_that_is_free(queue: ExportQueue, tmp_path: Path) -
     assert free_name(tmp_path, "view", ".png") == tmp_path / "view.png"
     (tmp_path / "view.png").write_bytes(b"")
     assert free_name(tmp_path, "view", ".png") == tmp_path / "view 2.png"
-    queue.add(picture_job(np.zeros((4, 5, 3), np.uint8), tmp_path, "view"))
-    assert finish(queue)[0].target == tmp_path / "view 2.png"
-    assert (tmp_path / "view 2.png").stat().st_size > 0
+    others = {tmp_path / "view 2.png"}  # of jobs that wait
+    queue.add(picture_job(np.zeros((4, 5, 3), np.uint8), tmp_path, "view", others))
+    assert finish(queue)[0].target == tmp_path / "view 3.png"
+    assert (tmp_path / "view 3.png").stat().st_size > 0

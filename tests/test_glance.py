@@ -151,3 +151,13 @@ def test_the_folder_around_a_light_field_is_found(tmp_path: Path) -> None:
         assert folder_around(path) == tmp_path / "all"
     with pytest.raises(InputError, match="no other light fields"):
         folder_around(tmp_path.joinpath(*"abcdefgh", "a.png"))  # farther from anything than is looked
+
+
+def test_views_in_a_single_row_are_nothing_to_choose_from(tmp_path: Path) -> None:
+    for folder in (
+        save_views(tmp_path / "row", random_views(1, 5), plain),
+        save_views(tmp_path / "column", random_views(5, 1), plain),
+    ):
+        assert members(folder) == ()
+        with pytest.raises(InputError, match="single row or column"):
+            open_light_field(folder)

@@ -13,9 +13,9 @@ from moving_scene import SIZE, TruthSynthesizer, light_field, truth
 from app import offscreen
 from app.engine import Engine
 from app.geometry import Zoom, place
-from app.interface import path_from_text
 from app.layout import lay_out
 from app.opening import open_by_content
+from app.typed_paths import path_from_text
 from lfcore.errors import InputError
 from lfcore.export import write_image
 from lfcore.lightfield import FloatArray

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app import panels, theme
-from app.commands import COMMANDS, Action, Ask, OpenPath, Request
+from app.commands import COMMANDS, Action, Ask, OpenTyped, Request
 from app.dialogs import Purpose
 from app.geometry import place
 from app.keyboard import _CHARACTERS, _KEYS
@@ -286,8 +286,21 @@ def test_typing_a_path_opens_it(screen: Screen) -> None:
     assert screen.state.look is Look.SYNTHESIS  # letters are text now, not commands
     screen.io.add_key_event(screen.imgui.Key.enter, True)
     screen.frame(2)
-    assert screen.requests == [OpenPath("/tmp/füße & co")]
+    assert screen.requests == [OpenTyped("/tmp/füße & co")]
     assert not screen.state.path_field
+
+
+def test_undoing_what_is_typed_leaves_the_view_alone(screen: Screen) -> None:
+    for name in ("Ctrl+Z", "Ctrl+Y"):
+        screen.press("Ctrl+Shift+O")
+        screen.frame(2)
+        screen.press(name)
+        assert screen.requests == []
+        screen.press("Esc")
+        screen.press("Esc")
+        screen.press(name)
+        assert len(screen.requests) == 1
+        screen.requests.clear()
 
 
 def test_escape_puts_the_top_thing_away(screen: Screen) -> None:

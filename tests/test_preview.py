@@ -12,11 +12,12 @@ import pytest
 from moving_scene import TruthSynthesizer, light_field
 
 from app.controller import Controller
+from app.desk import Folder
 from app.engine import Engine
 from app.opening import preview
 from app.state import Step
 from lfcore.camera_model import illum
-from lfcore.errors import InputError
+from lfcore.errors import Cancelled, InputError
 from lfcore.formats import coarse_light_field, open_light_field
 from lfcore.lightfield import LightField
 from lfcore.plane_scene import slanted_scene
@@ -83,3 +84,22 @@ def test_only_captures_that_are_not_kept_have_one(tmp_path: Path, monkeypatch: p
     assert coarse_light_field(capture) is None  # opened at once from now on
     assert preview(tmp_path) is None
     assert preview(tmp_path / "missing.LFR") is None
+
+
+def test_the_coarse_picture_goes_where_a_folder_is_opened_in_its_place(tmp_path: Path) -> None:
+    def opened(path: Path, _: object, cancelled: Callable[[], bool]) -> LightField | Folder:
+        if path == tmp_path:
+            return Folder(tmp_path, (tmp_path / "one",))
+        while not cancelled():
+            time.sleep(0.002)
+        raise Cancelled
+
+    synthesizer = TruthSynthesizer()
+    found = {Path("capture"): light_field(2, 2)}
+    controller = Controller(Engine(lambda: synthesizer, 2**20), opened, lambda: None, "truth", found.get)
+    controller.open(Path("capture"))
+    _until(controller, lambda: controller.previewing)
+    controller.open(tmp_path)
+    _until(controller, lambda: controller.folder is not None)
+    assert not controller.previewing and controller.light_field is None
+    controller.stop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.context import SpawnProcess
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +21,7 @@ import pytest
 from remote_models import PATIENT_SECONDS, blend, make
 
 from lfcore import remote
-from lfcore.errors import Cancelled, InputError, LfviewError
+from lfcore.errors import Cancelled, InputError, LfviewError, WeightsError
 from lfcore.lightfield import LightField
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
 from lfcore.synthesizer import MeanSynthesizer
@@ -98,8 +100,8 @@ def test_models_are_asked_in_turn_about_light_fields_of_any_size(process: Synthe
 
 def test_a_model_whose_name_and_key_are_stated_is_loaded_with_its_first_query() -> None:
     with SynthesisProcess(make) as process:
-        synthesizer = RemoteSynthesizer(process, "weigher", stated=Stated("told", "key told"))
-        assert (synthesizer.name, synthesizer.key, synthesizer.weighs) == ("told", "key told", False)
+        synthesizer = RemoteSynthesizer(process, "weigher", stated=Stated("told", "key of weigher"))
+        assert (synthesizer.name, synthesizer.key, synthesizer.weighs) == ("told", "key of weigher", False)
         assert process.pid is None
         field = light_field()
         synthesizer.set_light_field(field)
@@ -109,6 +111,29 @@ def test_a_model_whose_name_and_key_are_stated_is_loaded_with_its_first_query() 
         absent.set_light_field(field)
         with pytest.raises(InputError, match=r"^There is no such model\.$"):
             absent.synthesize(1, 0)
+
+
+def test_views_of_a_file_that_has_been_replaced_are_not_taken_for_those_of_the_one_before(process: SynthesisProcess) -> None:
+    synthesizer = RemoteSynthesizer(process, "blender", stated=Stated("blender", "key of the file before"))
+    synthesizer.set_light_field(light_field())
+    with pytest.raises(WeightsError, match="has been replaced"):
+        synthesizer.synthesize(1, 0)
+
+
+def test_a_process_that_could_not_be_started_once_is_started_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusing: list[BaseException] = [OSError(errno.EAGAIN, "not now")]
+    start = SpawnProcess.start
+
+    def started(process: SpawnProcess) -> None:
+        if refusing:
+            raise refusing.pop()
+        start(process)
+
+    monkeypatch.setattr(SpawnProcess, "start", started)
+    with SynthesisProcess(make) as process:
+        with pytest.raises(LfviewError, match=r"could not be started .*not now"):
+            process.start()
+        assert RemoteSynthesizer(process, "blender").key == "key of blender"
 
 
 def test_errors_surface_as_they_are(process: SynthesisProcess) -> None:

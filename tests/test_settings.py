@@ -150,3 +150,21 @@ def test_the_systems_place_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert default_path() == Path("/somewhere/lfview/settings.json")
     monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
     assert default_path() == Path.home() / ".config/lfview/settings.json"
+
+
+def test_what_is_nested_deeply_is_not_taken_over_and_harms_nothing(file: SettingsFile) -> None:
+    file.path.parent.mkdir()
+    looks = f'{{"deep": {"[" * 600}{"]" * 600}, "deeper": {{"a": {"[" * 900}{"]" * 900}}}, "usual": {{"u": 0.25}}}}'
+    file.path.write_text(f'{{"version": {VERSION}, "files": {looks}}}')
+    settings, message = file.load()
+    assert message is None
+    assert settings.files in ({}, {"usual": {"u": 0.25}})
+    file.save(replace(settings, panel=False))
+    assert not SettingsFile(file.path).load()[0].panel
+
+
+def test_names_that_no_file_can_have_are_left_out(file: SettingsFile) -> None:
+    file.path.parent.mkdir()
+    stored = {"version": VERSION, "recent": ["/a", "/\ud800x", "/b\0c", "/caf\udce9"], "model": "\ud800"}
+    file.path.write_text(json.dumps(stored))
+    assert file.load() == (Settings(recent=("/a", "/caf\udce9")), None)

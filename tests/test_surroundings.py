@@ -24,7 +24,7 @@ from app.opening import open_by_content
 from app.settings import Settings, SettingsFile, Theme, WindowPlace
 from app.state import Look
 from app.surroundings import SAVE_SECONDS, Keeping, Surroundings
-from app.watching import Watching
+from app.watching import Change, Watching
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
 
@@ -330,3 +330,64 @@ def test_a_name_beyond_text_is_survived(file: SettingsFile, made: list[Program])
     program.until(lambda: bool(program.controller.messages) or bool(program.controller.name))
     with pytest.raises(InputError):
         open_by_content(Path(os.fsdecode(b"/tmp/\xff")), lambda share: None, lambda: False)
+
+
+def test_no_frame_is_asked_for_once_a_change_has_been_taken_back(file: SettingsFile, made: list[Program]) -> None:
+    program = Program(file)
+    made.append(program)
+    program.open("/a/3x3")
+    program.tick(SAVE_SECONDS)
+    program.tick(SAVE_SECONDS)
+    assert program.around.next_frame_in is None
+    program.controller.state.move_to(0.25, 0.5)
+    program.tick()
+    assert program.around.next_frame_in is not None
+    program.controller.state.move_to(0.5, 0.5)
+    program.tick()
+    assert program.around.next_frame_in is None
+
+
+def test_the_browser_shows_where_what_is_open_lies_and_begins_with_it(program: Program, tmp_path: Path) -> None:
+    for folder in ("first", "second"):
+        for name in ("2x2", "3x3"):
+            save_views(tmp_path / folder / name, random_views(2, 2), plain)
+    state, first, second = program.controller.state, tmp_path / "first", tmp_path / "second"
+
+    def browse() -> Folder:
+        state.desk.card = None
+        program.around.fulfil(Browse(None))
+        program.until(lambda: state.desk.card is Card.BROWSER)
+        assert program.controller.folder is not None
+        return program.controller.folder
+
+    program.open(str(first / "3x3"))
+    assert browse().path == first and state.desk.chosen == 1
+    program.open(str(second / "2x2"))
+    assert browse().path == second and state.desk.chosen == 0
+    program.open(str(second / "3x3"))
+    assert browse().path == second and state.desk.chosen == 1
+
+
+def test_what_was_said_of_a_file_is_taken_back_when_another_is_open(program: Program) -> None:
+    program.open("/a/3x3")
+    program.around._watching._news.put((Path("/a/3x3"), Change.CHANGED))
+    program.tick()
+    assert len(program.controller.messages) == 1 and "Ctrl+R" in program.controller.messages[0]
+    program.controller.say("something else")
+    program.open("/a/2x2")
+    assert program.controller.messages == ["something else"]
+
+
+def test_foresight_that_the_command_line_switched_off_is_on_the_next_time(file: SettingsFile) -> None:
+    def run(foresight: bool) -> bool:
+        controller = Controller(Engine(lambda: TruthSynthesizer(), 2**20), lambda *_: light_field(), lambda: None, "truth")
+        controller.state.foresight = foresight
+        around = Surroundings(controller, lambda: None, Keeping(file.load()[0], None, file))
+        around.tick(1.0, False)
+        was = controller.state.foresight
+        around.stop()
+        controller.stop()
+        return was
+
+    assert not run(False)
+    assert run(True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,8 @@ def test_files_that_cannot_be_plans_are_refused(tmp_path: Path) -> None:
     assert not is_plan_file(tmp_path / "picture.json")
     assert not is_plan_file(tmp_path / "none.json")
     assert not is_plan_file(tmp_path)
+    os.mkfifo(tmp_path / "pipe.json")
+    assert not is_plan_file(tmp_path / "pipe.json")  # which would be waited for
     with pytest.raises(OutputError):
         save_plan(tmp_path / "missing" / "plan.json", PLANS[0])
 

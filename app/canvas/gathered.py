@@ -92,7 +92,7 @@ class Captured(Gathered):
             context, (width, height), [c / (columns - 1) for c in kept_columns], [r / (rows - 1) for r in kept_rows]
         )
         self._pixels = np.full((height, width, 4), 255, np.uint8)
-        self._dark = dark
+        self._dark = dark if set(self.kept) - dark else frozenset()  # better these than none
         self._waiting = list(self.order)
 
     @property

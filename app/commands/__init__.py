@@ -20,6 +20,7 @@ from app.commands.kinds import (
     Context,
     Needs,
     OpenPath,
+    OpenTyped,
     Request,
 )
 from app.commands.moving import NUDGE
@@ -44,6 +45,7 @@ __all__ = [
     "Context",
     "Needs",
     "OpenPath",
+    "OpenTyped",
     "Request",
     "run",
 ]

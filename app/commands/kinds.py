@@ -42,7 +42,14 @@ class Action(Enum):
 
 @dataclass(frozen=True)
 class OpenPath:
-    """Open the light field at this path, as it was typed or dropped."""
+    """Open the light field at this path."""
+
+    path: Path
+
+
+@dataclass(frozen=True)
+class OpenTyped:
+    """Open the light field at a path, as it was typed or pasted."""
 
     text: str
 
@@ -61,7 +68,7 @@ class Browse:
     folder: Path | None
 
 
-Request = Action | OpenPath | Ask | Browse | ExportRequest
+Request = Action | OpenPath | OpenTyped | Ask | Browse | ExportRequest
 
 
 class Needs(Enum):

@@ -76,7 +76,7 @@ def _tiles(folder: Folder, context: Context, shelf: Shelf) -> None:
     rows = -(-len(members) // columns)
     moved = _moved(columns, imgui.get_window_height() // (one.y + gap), len(members))
     desk.chosen = within(desk.chosen + moved, (0, len(members) - 1))
-    if moved:
+    if moved or imgui.is_window_appearing():
         bring_into_sight(desk.chosen // columns * (one.y + gap), one.y)
     first = max(int(imgui.get_scroll_y() // (one.y + gap)), 0)
     last = min(int((imgui.get_scroll_y() + imgui.get_window_height()) // (one.y + gap)), rows - 1)
@@ -97,7 +97,7 @@ def _tiles(folder: Folder, context: Context, shelf: Shelf) -> None:
         chosen = desk.chosen
     if chosen is not None:
         desk.chosen = chosen
-        context.requests.append(OpenPath(str(members[chosen])))
+        context.requests.append(OpenPath(members[chosen]))
     elif imgui.is_key_pressed(imgui.Key.backspace, False):
         _go_up(context, shelf)
 

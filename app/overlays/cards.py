@@ -5,14 +5,14 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app import theme
-from app.commands import Action, Context, OpenPath
+from app.commands import Action, Context, OpenTyped
 from app.geometry import Rect
 from app.readout import Readout
 from app.widgets import card, em, packed, text, tooltip, wrapped
 
 
 def messages(area: Rect, context: Context, readout: Readout) -> None:
-    """What went wrong, until it is put away."""
+    """What went wrong, the newest first, until it is put away."""
     if not readout.messages:
         return
     more = len(readout.messages) - 1
@@ -20,7 +20,7 @@ def messages(area: Rect, context: Context, readout: Readout) -> None:
         corner, size = imgui.get_window_pos(), imgui.get_window_size()
         edge = ImVec2(corner.x + em() * 0.25, corner.y + size.y)
         imgui.get_window_draw_list().add_rect_filled(corner, edge, packed(theme.ERROR), em() * 0.12)
-        wrapped(readout.messages[0])
+        wrapped(readout.messages[-1])
         if imgui.button("Dismiss"):
             context.requests.append(Action.DISMISS)
         tooltip("Put the message away  (Esc)")
@@ -63,5 +63,5 @@ def path_field(area: Rect, context: Context) -> None:
         tooltip("An ESLF picture, or a folder of views  (Enter opens)")
         wrapped("Enter opens it, Esc puts the field away. Or drop a file or folder on the window.", theme.TEXT_SOFT)
         if entered and state.path_text.strip():
-            context.requests.append(OpenPath(state.path_text))
+            context.requests.append(OpenTyped(state.path_text))
             state.path_field = False

@@ -55,4 +55,4 @@ def _recent(shelf: Shelf, count: int, across: int, context: Context, fonts: them
         if index % across:
             imgui.same_line(0, gap)
         if tiles.tile(path, shelf.thumbnail(path), False):
-            context.requests.append(OpenPath(str(path)))
+            context.requests.append(OpenPath(path))

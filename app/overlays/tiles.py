@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from app import theme
 from app.desk import Thumbnail
 from app.geometry import Rect
+from app.readable import readable
 from app.widgets import elided, em, packed, tooltip
 
 WIDTH, PICTURE_HEIGHT = 11.5, 8.2  # em
@@ -23,7 +24,7 @@ def size() -> ImVec2:
 def tile(path: Path, thumbnail: Thumbnail, chosen: bool) -> bool:
     """One tile at the cursor; whether it was clicked."""
     corner, (width, height) = imgui.get_cursor_screen_pos(), size()
-    clicked = bool(imgui.invisible_button(f"tile {path}", ImVec2(width, height)))
+    clicked = bool(imgui.invisible_button(f"tile {str(path)!a}", ImVec2(width, height)))
     hovered = imgui.is_item_hovered()
     said = thumbnail.reason or thumbnail.caption
     tooltip(said if said.startswith(str(path)) else f"{path}\n{said}".strip())
@@ -63,6 +64,7 @@ def _picture(frame: Rect, thumbnail: Thumbnail) -> None:
 
 def _beginning(words: str, width: float) -> str:
     """As many of the words as there is room for."""
+    words = readable(words)
     kept = words.split()
     while len(kept) > 1 and imgui.calc_text_size(" ".join(kept) + " …").x > width:
         kept.pop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from enum import Enum
 from typing import TypeVar
 
@@ -118,9 +119,7 @@ def _frames(choices: ExportChoices) -> None:
         logarithmic = imgui.SliderFlags_.logarithmic.value
         hint = "The colours end at white divided by this."
         choices.gain = slider("Gain", choices.gain, GAIN_LIMITS, f"× {choices.gain:.1f}", hint, logarithmic)
-    sizes = {f"{100 * choices.scale:.4g} %": choices.scale, **SIZES}
-    shown = next(name for name, scale in sizes.items() if scale == choices.scale)
-    choices.scale = sizes[choice("Size", shown, tuple(dict.fromkeys((*SIZES, shown))), "Of the views' own size")]
+    _size(choices)
     _, choices.labels = imgui.checkbox("Labels", choices.labels)
     tooltip("Captions with (u, v), and the scales of colours")
     imgui.same_line(0, em() * 0.9)
@@ -134,6 +133,14 @@ def _frames(choices: ExportChoices) -> None:
     )
     if choices.refocus:
         _focus(choices)
+
+
+def _size(choices: ExportChoices) -> None:
+    """One of the usual sizes, or that of a saved sweep."""
+    usual = next((name for name, scale in SIZES.items() if scale == choices.scale), None)
+    shown = usual or f"{100 * choices.scale:.4g} % (as saved)"
+    chosen = choice("Size", shown, tuple(dict.fromkeys((*SIZES, shown))), "Of the views' own size")
+    choices.scale = SIZES.get(chosen, choices.scale)
 
 
 def _grid(choices: ExportChoices, grid: Grid) -> None:
@@ -172,7 +179,7 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
     with font(fonts.regular, theme.SMALL):
         if fault:
             wrapped(fault, theme.WARNING)
-        elif readout.grid is not None and choices.made((readout.grid.width, readout.grid.height)).is_file():
+        elif readout.grid is not None and os.path.isfile(choices.made((readout.grid.width, readout.grid.height))):  # noqa: PTH113  False, too, where it may not be asked
             wrapped("Replaces the file of that name", theme.WARNING)
         elif choices.product is Product.SWEEP:
             text(f"{choices.frames / choices.fps:.1f} s", theme.TEXT_FAINT)

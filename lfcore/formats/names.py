@@ -66,12 +66,16 @@ def find_grid(folder: Path, pictures: Sequence[Path]) -> Grid:
 
 
 def belongs_to_grid(file: Path, pictures: Sequence[Path]) -> bool:
-    """Whether `file` looks like one view of a grid made by its neighbours: four or more alike, two numbers varying."""
+    """Whether `file` looks like one view of a grid made by its neighbours: three or more alike, two numbers varying; or one,
+    where names such as view_00_01 say what they are."""
     template = _template(file)
     files = _families(pictures).get(template, [])
     if template in ("gantry", "hci"):
         return len(files) > 1
-    return len(files) >= 3 and len(_row_and_column([_numbers(name) for name in files])) == 2
+    numbers = [_numbers(name) for name in files]
+    varying = len(_row_and_column(numbers))
+    said = bool(_PREFERRED.match(file.stem)) and len(numbers[0]) >= 2
+    return len(files) >= 3 and (varying == 2 or (varying == 1 and said))
 
 
 def _template(file: Path) -> str:
