@@ -106,6 +106,13 @@ def test_the_finished_picture_is_that_of_the_library(
     np.testing.assert_allclose(found, np.clip(expected, 0, 1), atol=2e-5)
 
 
+def test_where_all_views_are_dark_they_are_summed_up_all_the_same(bench: Any) -> None:
+    views = np.random.default_rng(0).integers(0, 9, (2, 2, 30, 37, 3), dtype=np.uint8)
+    dark, usual = (LightField(views, "x", "x", "x", dark=each) for each in (frozenset(np.ndindex(2, 2)), frozenset()))
+    wanted = Wanted((0.5, 0.5), 1.0, 2.0, True)
+    np.testing.assert_array_equal(bench(dark).finished(wanted), bench(usual).finished(wanted))
+
+
 @pytest.mark.parametrize("dtype", ["uint16", "float32"])
 def test_views_of_other_types_are_taken_in_8_bits(bench: Any, dtype: str) -> None:
     values = np.random.default_rng(1).random((3, 3, 20, 24, 3)).astype(np.float32)
