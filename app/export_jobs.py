@@ -44,19 +44,19 @@ class Polite:
         self._synthesizer.set_light_field(light_field)
 
     def synthesize(self, u: float, v: float, cancelled: Cancel = lambda: False) -> Synthesis:
-        """As Synthesizer; raises Cancelled once the export is."""
+        """As Synthesizer; raises Cancelled once this or the export is."""
         while True:
             while self._hand_waits():
-                self._check()
+                self._check(cancelled)
                 time.sleep(_GIVE_WAY_SECONDS)
-            self._check()
+            self._check(cancelled)
             try:
-                return self._synthesizer.synthesize(u, v, lambda: self._cancelled() or self._hand_waits())
+                return self._synthesizer.synthesize(u, v, lambda: self._cancelled() or cancelled() or self._hand_waits())
             except Cancelled:
-                self._check()
+                self._check(cancelled)
 
-    def _check(self) -> None:
-        if self._cancelled():
+    def _check(self, cancelled: Cancel) -> None:
+        if self._cancelled() or cancelled():
             raise Cancelled
 
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from lfcore.errors import Cancelled, LfviewError
+from app.faults import is_unexpected, sentence
+from lfcore.errors import Cancelled
 
 _log = logging.getLogger(__name__)
 
@@ -170,13 +171,10 @@ class ExportQueue:
             job.write(done, lambda: number in self._cancelled)
         except Cancelled:
             return Phase.CANCELLED, ""
-        except LfviewError as error:
-            return Phase.FAILED, str(error)
-        except MemoryError:
-            return Phase.FAILED, "There is not enough memory for this; make it smaller or close other programs."
         except Exception as error:  # the thread must outlive any fault of a job, and the fault must be seen
-            _log.exception("an export failed")
-            return Phase.FAILED, f"Unexpected fault in the program: {type(error).__name__}: {error}"
+            if is_unexpected(error):
+                _log.exception("an export failed")
+            return Phase.FAILED, sentence(error)
         return Phase.DONE, ""
 
     def _change(self, number: int, **changes: object) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
+from app.faults import is_unexpected, sentence
 from app.worker import Cancel, LatestWorker
-from lfcore.errors import Cancelled, LfviewError, OutputError
+from lfcore.errors import Cancelled, OutputError
 
 if TYPE_CHECKING:  # the readers of files are loaded in the thread, when the first glance is wanted
     from lfcore.formats.glance import Glance
@@ -117,13 +118,10 @@ class Gallery:
             return Seen(found)
         except Cancelled:
             raise
-        except LfviewError as error:
-            return Seen(None, str(error))
-        except MemoryError:
-            return Seen(None, "There is not enough memory to look at it.")
         except Exception as error:  # one odd file must not keep the others from being seen
-            _log.exception("looking at %s failed", path)
-            return Seen(None, f"Unexpected fault in the program: {type(error).__name__}: {error}")
+            if is_unexpected(error):
+                _log.exception("looking at %s failed", path)
+            return Seen(None, sentence(error))
 
     def _keep(self, key: str, found: Glance) -> None:
         if self._store is None:

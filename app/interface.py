@@ -25,6 +25,7 @@ from app.desk import Placed
 from app.engine import Answer
 from app.exhibits import Exhibit
 from app.export_requests import CancelExport, ExportAction, ExportRequest
+from app.faults import sentence
 from app.gallery import Seen
 from app.geometry import Placement, Point, Rect, Size, place, visible
 from app.layout import Layout, Strips
@@ -536,13 +537,9 @@ def _let_imgui_recover() -> None:
 
 def _sentence(error: Exception) -> str:
     """What is said of a fault."""
-    if isinstance(error, LfviewError):
-        return str(error)
     if isinstance(error, moderngl.Error):
         return f"The graphics cannot draw this: {error}; open a smaller light field, or update the graphics driver."
-    if isinstance(error, MemoryError):
-        return "There is not enough memory for this; close other programs or open a smaller light field."
-    return f"Unexpected fault in the program: {type(error).__name__}: {error}"
+    return sentence(error)
 
 
 def _panel_grounds(layout: Layout, pixels: float) -> list[tuple[Rect, tuple[float, float, float]]]:

@@ -66,10 +66,6 @@ class Settings:
         others = tuple(each for each in self.recent if each != path)
         return replace(self, recent=(path, *others)[:RECENT_LIMIT])
 
-    def without_recent(self, path: str) -> Settings:
-        """Without this path."""
-        return replace(self, recent=tuple(each for each in self.recent if each != path))
-
     def with_file(self, key: str, look: Mapping[str, Json]) -> Settings:
         """With this kept for the file of this content key, which is now the newest."""
         files = {name: each for name, each in self.files.items() if name != key}

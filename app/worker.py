@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from lfcore.errors import Cancelled, LfviewError
+from app.faults import is_unexpected, sentence
+from lfcore.errors import Cancelled
 
 Result = TypeVar("Result")
 Cancel = Callable[[], bool]
@@ -124,10 +125,7 @@ class LatestWorker(Generic[Result]):
             return Done(ticket, job(lambda: ticket <= self._cancelled_up_to))
         except Cancelled:
             return None
-        except LfviewError as error:
-            return Failed(ticket, str(error))
-        except MemoryError:
-            return Failed(ticket, "There is not enough memory for this; close other programs or open a smaller light field.")
         except Exception as error:  # the thread must outlive any fault of a job, and the fault must be seen
-            _log.exception("a job failed")
-            return Failed(ticket, f"Unexpected fault in the program: {type(error).__name__}: {error}")
+            if is_unexpected(error):
+                _log.exception("a job failed")
+            return Failed(ticket, sentence(error))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from app import offscreen
 from app.engine import Engine
 from app.geometry import Zoom, place
 from app.layout import lay_out
+from app.offscreen import Offscreen
 from app.opening import open_by_content
+from app.state import Look
 from app.typed_paths import path_from_text
 from lfcore.errors import InputError
 from lfcore.export import write_image
@@ -107,3 +110,36 @@ def test_the_screenshot_of_a_folder_shows_what_is_in_it(tmp_path: Path, monkeypa
     picture = read(tmp_path / "viewer.png")
     for value in (0.3, 0.9):
         assert (np.abs(picture - value).max(axis=2) < 0.01).sum() > 2000
+
+
+def test_an_export_that_runs_is_given_up_when_asked_twice(viewer: Offscreen, monkeypatch: pytest.MonkeyPatch) -> None:
+    interface = viewer.interface
+    with monkeypatch.context() as exporting:
+        exporting.setattr("app.exports.Exports.busy", property(lambda _: True))
+        interface.quit()
+        assert not interface.closing and "given up" in interface.controller.messages[-1]
+        interface.controller.dismiss()
+        interface.quit()
+        assert not interface.closing  # it had been put away
+        interface.quit()
+        assert interface.closing
+    interface.closing = False
+    interface.quit()
+    assert interface.closing
+
+
+def test_a_map_of_another_model_is_not_shown(viewer: Offscreen) -> None:
+    """Whose synthesis has none itself: the picture is dimmed, as the panels say."""
+    controller, state = viewer.interface.controller, viewer.interface.controller.state
+    state.look = Look.DISPARITY
+    mapped = viewer.settled()
+    assert controller.has_disparity
+    newest = controller.newest
+    assert newest is not None
+    flat = replace(newest, synthesis=replace(newest.synthesis, disparity=None), percentiles=None)
+    controller._screen.clear()
+    controller._screen.accept(flat, controller.viewpoint)
+    assert not controller.has_disparity
+    frame = viewer.interface._frame()
+    assert frame.look is Look.SYNTHESIS and frame.dim < 1
+    assert mapped.shape == viewer.frame().shape

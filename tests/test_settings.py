@@ -56,7 +56,6 @@ def test_the_newest_stay_and_the_oldest_go() -> None:
     assert len(settings.recent) == RECENT_LIMIT
     assert settings.recent[:2] == ("/10", f"/{RECENT_LIMIT + 4}")
     assert "/4" not in settings.recent
-    assert settings.without_recent("/10").recent == settings.recent[1:]
     for number in range(FILES_LIMIT + 5):
         settings = settings.with_file(f"k{number}", {"u": number})
     settings = settings.with_file("k50", {"u": -1})
