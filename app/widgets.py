@@ -142,14 +142,24 @@ def button(label: str, command: str, context: commands.Context, width: float = 0
     tooltip(commands.COMMANDS[command].tooltip)
 
 
-def row(label: str, command: str, selected: bool, context: commands.Context) -> None:
-    """A row of a list that runs the named command, with the key at its right end."""
-    _choice(label, command, selected, context, imgui.get_content_region_avail().x, theme.PANEL)
-
-
 def tile(label: str, command: str, selected: bool, context: commands.Context, width: float) -> None:
-    """As `row`, but a button of this width."""
-    _choice(label, command, selected, context, width, theme.FIELD)
+    """A button of this width that runs the named command, with the key at its right end; one of several to choose from."""
+    height = imgui.get_frame_height()
+    corner = imgui.get_cursor_screen_pos()
+    if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
+        commands.run(command, context)
+    fill = theme.ACCENT_DEEP if selected else theme.FIELD_HOVERED if imgui.is_item_hovered() else theme.FIELD
+    tooltip(commands.COMMANDS[command].tooltip)
+    brush = imgui.get_window_draw_list()
+    end = ImVec2(corner.x + width, corner.y + height)
+    brush.add_rect_filled(corner, end, packed(fill), imgui.get_style().frame_rounding)
+    pad = em() * 0.55
+    y = corner.y + (height - em()) / 2
+    brush.add_text(ImVec2(corner.x + pad, y), packed(theme.TEXT), label)
+    key = commands.COMMANDS[command].keys[0]
+    x = end.x - pad - imgui.calc_text_size(key).x
+    if x - corner.x - pad > imgui.calc_text_size(label).x:  # the tooltip tells it in any case
+        brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
 
 
 def tab(label: str, command: str, selected: bool, context: commands.Context, width: float, fonts: theme.Fonts) -> None:
@@ -186,25 +196,6 @@ def pairs(name: str, rows: Sequence[tuple[str, str]]) -> None:
             text(value)
         imgui.end_table()
     imgui.pop_style_var()
-
-
-def _choice(label: str, command: str, selected: bool, context: commands.Context, width: float, ground: ImVec4) -> None:
-    height = imgui.get_frame_height()
-    corner = imgui.get_cursor_screen_pos()
-    if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
-        commands.run(command, context)
-    fill = theme.ACCENT_DEEP if selected else theme.FIELD_HOVERED if imgui.is_item_hovered() else ground
-    tooltip(commands.COMMANDS[command].tooltip)
-    brush = imgui.get_window_draw_list()
-    end = ImVec2(corner.x + width, corner.y + height)
-    brush.add_rect_filled(corner, end, packed(fill), imgui.get_style().frame_rounding)
-    pad = em() * 0.55
-    y = corner.y + (height - em()) / 2
-    brush.add_text(ImVec2(corner.x + pad, y), packed(theme.TEXT), label)
-    key = commands.COMMANDS[command].keys[0]
-    x = end.x - pad - imgui.calc_text_size(key).x
-    if x - corner.x - pad > imgui.calc_text_size(label).x:  # the tooltip tells it in any case
-        brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
 
 
 def switch(label: str, command: str, on: bool, context: commands.Context) -> None:
