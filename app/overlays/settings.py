@@ -10,7 +10,7 @@ from app.desk import Card
 from app.geometry import Rect
 from app.readout import Readout
 from app.settings import SCALE_LIMITS, Theme
-from app.widgets import CARD, button, card, choice, em, font, heading, switch, text, tooltip, wrapped
+from app.widgets import CARD, button, card, choice, em, font, heading, labelled, switch, text, tooltip, wrapped
 
 
 def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -46,9 +46,7 @@ def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts)
 def _scale(context: Context) -> None:
     """The scale in steps, or that of the monitor."""
     desk = context.state.desk
-    imgui.align_text_to_frame_padding()
-    text("Scale", theme.TEXT_SOFT)
-    imgui.same_line(4.5 * em())
+    labelled("Scale")
     square = imgui.get_frame_height()
     imgui.begin_disabled(context.scale <= SCALE_LIMITS[0])
     button("-", "smaller", context, square)

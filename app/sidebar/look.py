@@ -12,7 +12,7 @@ from app.looking import RANGE_LIMITS, level_limits
 from app.readout import Readout
 from app.state import GAIN_LIMITS, TAIL_LIMITS, Look
 from app.tone import CURVE_MEANING, GAMMA_LIMITS, STOPS_LIMITS, Curve
-from app.widgets import choice, em, heading, number, slider, switch, text, tile, tooltip, typed
+from app.widgets import choice, em, heading, labelled, number, slider, switch, tile, tooltip, typed
 from lfcore.colormaps import ColourMap
 from lfcore.nearest_inputs import NEIGHBOURS
 
@@ -134,9 +134,7 @@ def _range(context: Context, readout: Readout) -> None:
         hint = "So many per cent of the disparities at either end of the range share the last colour.  (, and .)"
         state.tail = slider("Cut off", state.tail, TAIL_LIMITS, f"{state.tail:.1f} %", hint)
     else:
-        imgui.align_text_to_frame_padding()
-        text("From, to", theme.TEXT_SOFT)
-        imgui.same_line(4.5 * em())
+        labelled("From, to")
         imgui.set_next_item_width(imgui.get_content_region_avail().x)
         changed, low, high = imgui.drag_float_range2("##range", *hand_range, 0.02, *RANGE_LIMITS, "%.2f", "%.2f")
         tooltip("Disparities of the first and the last colour, px over the baseline: drag, or Ctrl + click and type.")
