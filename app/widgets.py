@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from imgui_bundle import ImVec2, ImVec4, imgui
@@ -32,6 +32,16 @@ MINUS = "\N{MINUS SIGN}"
 def number(value: float, decimals: int) -> str:
     """A number with a true minus sign, so that columns of them line up."""
     return f"{value:.{decimals}f}".replace("-", MINUS)
+
+
+def capital(words: str) -> str:
+    """The words as they begin a sentence, or an entry of a list."""
+    return words[:1].upper() + words[1:]
+
+
+def disparity_words(disparity: float, columns: int) -> str:
+    """A disparity over the baseline, and per captured view of a grid with so many columns."""
+    return f"{number(disparity, 2)} px, {number(disparity / (columns - 1), 3)} per view"
 
 
 def decibels(value: float) -> str:
@@ -163,11 +173,21 @@ def broken(words: str, width: float) -> str:
 
 def heading(words: str, fonts: theme.Fonts) -> None:
     """The title of a section, with a rule above it."""
+    rule()
+    title(words, fonts)
+
+
+def rule() -> None:
+    """A line between sections."""
     spacing = imgui.get_style().item_spacing
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, em() * 0.38))
     imgui.dummy(ImVec2(0, 0))
     imgui.separator()
     imgui.pop_style_var()
+
+
+def title(words: str, fonts: theme.Fonts) -> None:
+    """The title alone, of the first section in a tab, or of a table."""
     with font(fonts.bold, theme.SMALL):
         text(words, theme.TEXT_SOFT)
 
@@ -189,14 +209,16 @@ def button(label: str, command: str, context: commands.Context, width: float = 0
     tooltip(commands.COMMANDS[command].tooltip)
 
 
-def tile(label: str, command: str, selected: bool, context: commands.Context, width: float) -> None:
-    """A button of this width that runs the named command, with the key at its right end; one of several to choose from."""
+def tile(label: str, command: str, selected: bool, context: commands.Context, width: float, why_not: str = "") -> None:
+    """A button of this width that runs the named command, with the key at its right end; one of several to choose from.
+    why_not: why it cannot be pressed."""
+    imgui.begin_disabled(bool(why_not))
     height = imgui.get_frame_height()
     corner = imgui.get_cursor_screen_pos()
     if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
         commands.run(command, context)
     fill = theme.ACCENT_DEEP if selected else theme.FIELD_HOVERED if imgui.is_item_hovered() else theme.FIELD
-    tooltip(commands.COMMANDS[command].tooltip)
+    tooltip(why_not or commands.COMMANDS[command].tooltip)
     brush = imgui.get_window_draw_list()
     end = ImVec2(corner.x + width, corner.y + height)
     brush.add_rect_filled(corner, end, packed(fill), imgui.get_style().frame_rounding)
@@ -207,6 +229,7 @@ def tile(label: str, command: str, selected: bool, context: commands.Context, wi
     x = end.x - pad - imgui.calc_text_size(key).x
     if x - corner.x - pad > imgui.calc_text_size(label).x:  # the tooltip tells it in any case
         brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
+    imgui.end_disabled()
 
 
 def tab(label: str, command: str, selected: bool, context: commands.Context, width: float, fonts: theme.Fonts) -> None:
@@ -265,12 +288,12 @@ def labelled(words: str) -> None:
     imgui.same_line(imgui.get_cursor_start_pos().x + LABELS * em())
 
 
-def choice(label: str, value: str, choices: Sequence[str], hint: str) -> str:
-    """A list that opens, behind its label. Returns what is chosen."""
+def choice(label: str, value: str, choices: Sequence[str], hint: str, shown_as: Callable[[str], str] = str) -> str:
+    """A list that opens, behind its label. Returns what is chosen. shown_as: what an entry is called on screen."""
     labelled(label)
     imgui.set_next_item_width(imgui.get_content_region_avail().x)
     shown = choices.index(value) if value in choices else 0
-    _, index = imgui.combo(f"##{label}", shown, list(choices))
+    _, index = imgui.combo(f"##{label}", shown, [shown_as(each) for each in choices])
     tooltip(hint)
     return choices[index]
 
