@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 from test_panels import Screen
 
-from app import widgets
+from app import statusbar, theme, widgets
+from app.readout import Readout
 from app.sidebar import look, viewpoint_pad
-from app.state import Tab
+from app.state import Grid, Tab
 from app.widgets import broken, counted
+from lfcore.cache import rounded
 
 
 @pytest.fixture
@@ -130,3 +132,51 @@ def test_nothing_is_complained_of_when_the_program_ends_within_a_frame(
     with pytest.raises(SystemExit):
         screen.frame()
     assert capfd.readouterr() == ("", "")
+
+
+def test_captured_views_in_memory_are_seen_in_the_pad() -> None:
+    grid = Grid(3, 4, 100, 80, frozenset({(0, 1)}))
+    kept = [rounded(*grid.position(index)) for index in (0, 1, 6)]
+    readout = Readout(grid=grid, cached=(*kept, (0.123, 0.4)), inputs=frozenset({(0, 0), (0, 3)}))
+    colours = viewpoint_pad.dot_colours(grid, readout)
+    assert [index for index, colour in enumerate(colours) if colour is theme.ACCENT] == [0, 6]
+    assert colours[1] is theme.FIELD_ACTIVE  # dark, whatever else it is
+    assert colours[3] is theme.TEXT
+
+
+def said_below(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The parts of the status line that are drawn from now on."""
+    shown: list[str] = []
+    original = statusbar.text
+
+    def text(words: str, *colour: Any) -> None:
+        shown.append(words)
+        original(words, *colour)
+
+    monkeypatch.setattr(statusbar, "text", text)
+    return shown
+
+
+@pytest.mark.parametrize(("size", "said"), [((600, 500), True), ((1280, 800), False)])
+def test_the_status_line_says_where_the_panel_has_no_room(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int], said: bool
+) -> None:
+    shown = said_below(monkeypatch)
+    screen.size = size
+    screen.frame()
+    assert ("no room for the panel" in shown) is said
+    screen.state.panel = False  # nobody wants it
+    shown.clear()
+    screen.frame()
+    assert "no room for the panel" not in shown
+
+
+def test_the_status_line_tells_one_from_several_and_whether_views_are_made_ahead(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = said_below(monkeypatch)
+    screen.readout = replace(screen.readout, cached=((0.5, 0.5),), cache_hits=1)
+    screen.frame()
+    assert "memory 0 of 1 MiB: 1 view, 1 hit" in shown
+    screen.press("A")
+    assert "memory 0 of 1 MiB: 1 view, 1 hit, none ahead" in shown
