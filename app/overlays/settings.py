@@ -35,7 +35,7 @@ def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts)
         heading("Remembered", fonts)
         wrapped("Window, panel, these settings, recent files, and how each file was looked at.", theme.TEXT_SOFT)
         imgui.begin_disabled(not readout.shelf.recent)
-        button("Forget recent files", "forget", context)
+        button("Forget files and how they were looked at", "forget", context)
         imgui.end_disabled()
         imgui.same_line()
         if imgui.button("Done"):

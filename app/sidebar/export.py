@@ -18,6 +18,7 @@ from app.readout import Readout
 from app.state import Grid
 from app.widgets import (
     button,
+    capital,
     choice,
     counted,
     elided,
@@ -42,7 +43,7 @@ _Chosen = TypeVar("_Chosen", bound=Enum)
 _LEAST_FPS = 0.1
 _MOST_FRAMES = 9_999  # that can be typed; a file may say more
 _ESLF_SIDE = 14  # views that an ESLF holds along each side
-_SAME_MODEL = "as in the window"
+_SAME_MODEL = "As in the window"
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -62,7 +63,7 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
 
 def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
     heading("Path", fonts)
-    choices.shape = choice("Shape", choices.shape, SHAPES, "The way of the viewpoint, at even speed")
+    choices.shape = choice("Shape", choices.shape, SHAPES, "The way of the viewpoint, at even speed", capital)
     if choices.shape == KEY_FRAMES:
         count = len(choices.key_frames)
         width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
@@ -126,7 +127,7 @@ def _focus(choices: ExportChoices) -> None:
 
 def _frames(choices: ExportChoices) -> None:
     layers = {layer: name for name, layer in LAYERS.items()}
-    hint = "What the frames show. Errors are shown at captured views only."
+    hint = "What the frames show. Differences are shown at captured views only."
     choices.layer = LAYERS[choice("Show", layers[choices.layer], tuple(LAYERS), hint)]
     if choices.layer is Layer.ERROR:
         logarithmic = imgui.SliderFlags_.logarithmic.value

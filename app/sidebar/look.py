@@ -19,7 +19,7 @@ from lfcore.nearest_inputs import NEIGHBOURS
 _TILES = (
     ("Synthesis", "synthesis", Look.SYNTHESIS),
     ("Disparity", "disparity", Look.DISPARITY),
-    ("Error", "error", Look.ERROR),
+    ("Difference", "error", Look.ERROR),
     ("Warped inputs", "warped", Look.WARPED_ALL),
     ("Top left", "top left", Look.WARPED_TOP_LEFT),
     ("Top right", "top right", Look.WARPED_TOP_RIGHT),
@@ -27,8 +27,8 @@ _TILES = (
     ("Bottom right", "bottom right", Look.WARPED_BOTTOM_RIGHT),
     ("Leaning", "lean", Look.LEAN),
     ("Disagreement", "disagreement", Look.DISAGREEMENT),
-    ("Sweep mean", "sweep mean", Look.SWEEP_MEAN),
-    ("Sweep deviation", "sweep deviation", Look.SWEEP_DEVIATION),
+    ("Sweep", "sweep mean", Look.SWEEP_MEAN),
+    ("Deviation", "sweep deviation", Look.SWEEP_DEVIATION),
 )
 _LOGARITHMIC = imgui.SliderFlags_.logarithmic.value
 
@@ -102,20 +102,20 @@ def _of_this_look(context: Context, readout: Readout, fonts: theme.Fonts) -> Non
         _colour_map(context)
         _gain(context, "The map goes up to white divided by this.  (, and .)")
     elif look is Look.ERROR:
-        heading("Error", fonts)
-        _gain(context, "The error is shown this many times as bright.  (, and .)")
+        heading("Difference", fonts)
+        _gain(context, "The difference is shown this many times as bright.  (, and .)")
     elif look is Look.LEAN and readout.weighed:
         heading("Weights", fonts)
-        _gain(context, "Weights are raised to this power, so that small differences are seen.  (, and .)", "Contrast")
+        _gain(context, "Weights are raised to this power, so that small differences are seen.  (, and .)", "Contrast", "^")
     elif look is Look.SWEEP_MEAN:
         heading("Plane sweep", fonts)
     if look.is_sweep:
         _level(context)
 
 
-def _gain(context: Context, hint: str, label: str = "Gain") -> None:
+def _gain(context: Context, hint: str, label: str = "Gain", sign: str = "×") -> None:
     state = context.state
-    state.gain = slider(label, state.gain, GAIN_LIMITS, f"× {state.gain:.1f}", hint, _LOGARITHMIC)
+    state.gain = slider(label, state.gain, GAIN_LIMITS, f"{sign} {state.gain:.1f}", hint, _LOGARITHMIC)
 
 
 def _colour_map(context: Context) -> None:
