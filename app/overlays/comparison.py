@@ -61,7 +61,7 @@ def partner_name(state: ViewState, readout: Readout) -> str:
 
 def score_words(score: ScoreText) -> str:
     """How far two pictures are apart, and by which protocol."""
-    return f"{decibels(score.psnr)}, SSIM {number(score.ssim, 4)}, {score.protocol.partition(':')[0]}"
+    return f"PSNR {decibels(score.psnr)}, SSIM {number(score.ssim, 4)}, {score.protocol.partition(':')[0]}"
 
 
 def difference_name(state: ViewState) -> str:

@@ -115,7 +115,7 @@ def _words(readout: Readout, grid: Grid, index: int) -> str:
     if score is None:
         why = "not scored yet" if readout.model not in readout.compared.never_scored else "an input, not scored"
         return f"{name}: {why}. A click goes there."
-    return f"{name}: {decibels(score.psnr)}, SSIM {number(score.ssim, 4)} ({score.protocol}). A click goes there."
+    return f"{name}: PSNR {decibels(score.psnr)}, SSIM {number(score.ssim, 4)} ({score.protocol}). A click goes there."
 
 
 def _bar() -> None:
