@@ -10,7 +10,6 @@ import pytest
 from test_panels import Screen
 
 from app import statusbar, theme, widgets
-from app.readout import Readout
 from app.sidebar import look, viewpoint_pad
 from app.state import Grid, Tab
 from app.widgets import broken, counted
@@ -137,8 +136,7 @@ def test_nothing_is_complained_of_when_the_program_ends_within_a_frame(
 def test_captured_views_in_memory_are_seen_in_the_pad() -> None:
     grid = Grid(3, 4, 100, 80, frozenset({(0, 1)}))
     kept = [rounded(*grid.position(index)) for index in (0, 1, 6)]
-    readout = Readout(grid=grid, cached=(*kept, (0.123, 0.4)), inputs=frozenset({(0, 0), (0, 3)}))
-    colours = viewpoint_pad.dot_colours(grid, readout)
+    colours = viewpoint_pad.dot_colours(grid, (*kept, (0.123, 0.4)), frozenset({(0, 0), (0, 3)}))
     assert [index for index, colour in enumerate(colours) if colour is theme.ACCENT] == [0, 6]
     assert colours[1] is theme.FIELD_ACTIVE  # dark, whatever else it is
     assert colours[3] is theme.TEXT

@@ -59,7 +59,7 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     grid = readout.grid
     if grid is not None:
         radius = min(em() * 0.14, size / _SPAN / max(grid.rows, grid.columns) * 0.25)
-        for index, colour in enumerate(dot_colours(grid, readout)):
+        for index, colour in enumerate(dot_colours(grid, readout.cached, readout.inputs)):
             given = divmod(index, grid.columns) in readout.inputs
             brush.add_circle_filled(at(grid.position(index)), (1.7 if given else 1.0) * radius, packed(colour), _DOT_SIDES)
     if exporting:
@@ -75,22 +75,21 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     brush.pop_clip_rect()
 
 
-def dot_colours(grid: Grid, readout: Readout) -> list[ImVec4]:
-    """Of the captured views."""
-    kept = frozenset(readout.cached)
-    return [_colour(divmod(index, grid.columns), point in kept, grid, readout) for index, point in enumerate(_as_kept(grid))]
+@functools.lru_cache(maxsize=2)  # in most frames all is as in the one before
+def dot_colours(grid: Grid, cached: tuple[Point, ...], inputs: frozenset[tuple[int, int]]) -> tuple[ImVec4, ...]:
+    """Of the captured views, of which those at `cached` viewpoints are in memory, and those in the rows and columns of `inputs`
+    are given to the model."""
+    kept = frozenset(cached)
+    places = (divmod(index, grid.columns) for index in range(grid.rows * grid.columns))
+    return tuple(
+        _colour(place in grid.dark, rounded(*grid.position(index)) in kept, place in inputs)
+        for index, place in enumerate(places)
+    )
 
 
-def _colour(place: tuple[int, int], kept: bool, grid: Grid, readout: Readout) -> ImVec4:
-    """Whether the view in that row and column is dark, in memory, or an input."""
-    if place in grid.dark:
+def _colour(dark: bool, kept: bool, given: bool) -> ImVec4:
+    if dark:
         return theme.FIELD_ACTIVE
     if kept:
         return theme.ACCENT
-    return theme.TEXT if place in readout.inputs else theme.TEXT_SOFT
-
-
-@functools.lru_cache(maxsize=2)
-def _as_kept(grid: Grid) -> tuple[Point, ...]:
-    """(u, v) of the captured views as caches know them."""
-    return tuple(rounded(*grid.position(index)) for index in range(grid.rows * grid.columns))
+    return theme.TEXT if given else theme.TEXT_SOFT
