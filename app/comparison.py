@@ -11,6 +11,7 @@ from app.limits import within
 # Partners that are no model; the texts are their names on screen.
 CAPTURED_VIEW = "captured view"
 INSTANT = "instant"
+NO_CAPTURED_VIEW = "No captured view here"
 
 BLOCK_RANGE = (50.0, 20.0)  # dB of the first and the last colour of PSNR by block
 WIPE_STEP = 0.02  # of the width of the picture's area, by a key

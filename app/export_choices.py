@@ -26,7 +26,7 @@ SIZES = {"25 %": 0.25, "50 %": 0.5, "100 %": 1.0, "150 %": 1.5, "200 %": 2.0, "3
 LAYERS = {
     "Image": Layer.IMAGE,
     "Disparity": Layer.DISPARITY,
-    "Error": Layer.ERROR,
+    "Difference": Layer.ERROR,
     "Image | captured": Layer.BESIDE_CAPTURED,
     "Image | disparity": Layer.BESIDE_DISPARITY,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 from app.limits import within
@@ -12,6 +13,7 @@ from lfcore.key_frames import MAX_FOCUS
 # Of the plane sweep, px over the baseline: those of the paper's disparity network, and as far beyond as a light field reaches.
 LEVELS = (-21.0, 21.0)
 LEVEL_STEP = (LEVELS[1] - LEVELS[0]) / 99
+_SAME_LEVEL = 1e-6  # of a step: what rounding leaves
 
 # Red, green and blue (1 = full) by which the inputs, in the order of CORNERS, are told apart,
 # by colour-blind eyes too (Okabe and Ito 2008).
@@ -55,8 +57,13 @@ class Looking:
         return self.with_range(middle - half, middle + half)
 
     def at_next_level(self, step: int, limits: tuple[float, float]) -> Looking:
-        """At the level so many steps further; levels are those of the disparity network, or lie between or beyond them."""
-        return replace(self, level=within(self.level + step * LEVEL_STEP, limits))
+        """At the level of the disparity network that comes next in that direction, or so many after it; beyond the network's
+        they go on in the same steps, as far as the limits."""
+        place = (self.level - LEVELS[0]) / LEVEL_STEP  # a whole number at a level of the network
+        nearest = round(place)
+        if abs(place - nearest) > _SAME_LEVEL:
+            nearest = math.floor(place) if step > 0 else math.ceil(place)
+        return replace(self, level=within(LEVELS[0] + (nearest + step) * LEVEL_STEP, limits))
 
     def next_colour_map(self) -> Looking:
         """With the colour map after this one, going round."""

@@ -63,12 +63,12 @@ def draw(
         if layout.strips is not None:
             state.sliced = state.focusing.pin or state.cursor or state.sliced or (size[0] / 2, size[1] / 2)
             strips.draw(layout.strips, panes[0].frame, state, readout, panes[0].placement(state.zoom, size))
-        overlays.wipe_handle(area, panes, state)
+        overlays.wipe_handle(area, panes, state, readout)
         overlays.notices(area, state, readout)
         overlays.legend(area, state, readout)
         overlays.inspector(area, state, readout)
         if not covered:
-            overlays.missing(area, context, readout)
+            overlays.missing(area, panes, context, readout)
     elif readout.captions:
         overlays.legend(area, state, readout)
     elif readout.loading is None and not covered:
@@ -76,7 +76,8 @@ def draw(
     if layout.panel is not None:
         panel = extras if readout.captions else sidebar
         panel.draw(layout.panel, context, readout, fonts)
-    statusbar.draw(layout.status, state, readout, panes[0].placement(state.zoom, size).scale)
+    no_room = state.panel and layout.panel is None and (readout.grid is not None or bool(readout.captions))
+    statusbar.draw(layout.status, state, readout, panes[0].placement(state.zoom, size).scale, no_room)
     overlays.browser(area, context, readout.shelf, fonts)
     overlays.settings(area, context, readout, fonts)
     overlays.palette(area, context)

@@ -11,7 +11,7 @@ from app.geometry import Rect
 from app.readout import Readout
 from app.sidebar.extras import focus_text
 from app.state import STEP_MEANING, Step, ViewState
-from app.widgets import em, milliseconds, number, packed, text, tooltip, window
+from app.widgets import counted, disparity_words, em, milliseconds, number, packed, text, tooltip, window
 
 STEP_COLOURS = {
     Step.BLEND: theme.TEXT_FAINT,
@@ -29,8 +29,8 @@ class _Part:
     colour: ImVec4 = theme.TEXT_SOFT
 
 
-def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float) -> None:
-    """The line; parts that find no room are left out, the least important first."""
+def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float, no_room: bool) -> None:
+    """The line; parts that find no room are left out, the least important first. no_room: for the panel, which is wanted."""
     pad = em() * 0.8
     with window("status", rect, padding=ImVec2(pad, 0)):
         y = (rect.height - em()) / 2
@@ -48,7 +48,7 @@ def draw(rect: Rect, state: ViewState, readout: Readout, zoom: float) -> None:
             right -= width
             _put(part, right, y)
             right -= gap
-        for part in _left_parts(state, readout):
+        for part in _left_parts(state, readout, no_room):
             width = imgui.calc_text_size(part.words).x
             if left + gap + width > right:
                 break
@@ -69,7 +69,7 @@ def _step(readout: Readout, x: float, y: float) -> float:
     if readout.step_ms is not None:
         words += f"  {milliseconds(readout.step_ms)}"
     if readout.from_cache:
-        words += " (cached)"
+        words += " (kept)"
     corner = imgui.get_window_pos()
     radius = em() * 0.28
     middle = ImVec2(corner.x + x + radius, corner.y + y + em() / 2)
@@ -77,6 +77,8 @@ def _step(readout: Readout, x: float, y: float) -> float:
     start = x + 2 * radius + em() * 0.5
     stages = ", ".join(f"{name} {milliseconds(1e3 * seconds)}" for name, seconds in readout.timings if name != "total")
     hint = f"The step on screen: {STEP_MEANING[step]}." + (f"  Newest synthesis: {stages}." if stages else "")
+    if readout.from_cache:
+        hint += "  It was kept, in memory or on disk; the time is what it took when it was made."
     _put(_Part(words, hint, theme.TEXT), start, y)
     return start + imgui.calc_text_size(words).x
 
@@ -91,8 +93,11 @@ def _exhibit(state: ViewState, readout: Readout, x: float, y: float) -> float:
     return x + imgui.calc_text_size(words).x
 
 
-def _left_parts(state: ViewState, readout: Readout) -> list[_Part]:
+def _left_parts(state: ViewState, readout: Readout, no_room: bool) -> list[_Part]:
     parts = []
+    if no_room:
+        hint = "The panel with its tabs appears in a window that is wider, or higher; all commands are found by Ctrl+P"
+        parts.append(_Part("no room for the panel", hint))
     if readout.exporting:
         parts.append(_Part(readout.exporting, "What is being exported, or has just been; see the tab Export  (Ctrl+E)"))
     if readout.captions:
@@ -101,11 +106,13 @@ def _left_parts(state: ViewState, readout: Readout) -> list[_Part]:
         parts.append(_Part(readout.busy, "What the synthesis thread is doing now"))
     parts.append(_Part(f"model {readout.model}", "The model that synthesizes when the hand rests"))
     used, limit = readout.cache_bytes / 2**20, readout.cache_limit / 2**20
-    ahead = "are computed ahead" if state.foresight else "are not computed ahead"
+    held = f"{counted(len(readout.cached), 'view')}, {counted(readout.cache_hits, 'hit')}"
+    ahead = "" if state.foresight else ", none ahead"
+    more = "are computed ahead" if state.foresight else "are not computed ahead"
     parts.append(
         _Part(
-            f"cache {used:.0f} of {limit:.0f} MiB, {len(readout.cached)} views, {readout.cache_hits} hits",
-            f"Views at hand in memory are shown at once; while nothing else is to be done, more {ahead}  (A)",
+            f"memory {used:.0f} of {limit:.0f} MiB: {held}{ahead}",
+            f"Views in memory are shown at once, which is a hit; while nothing else is to be done, more {more}  (A)",
         )
     )
     return parts
@@ -117,8 +124,7 @@ def _right_parts(state: ViewState, readout: Readout, zoom: float) -> list[_Part]
         x, y = int(state.cursor[0]), int(state.cursor[1])
         words = f"x {x}  y {y}"
         if readout.disparity_under_cursor is not None and readout.grid is not None:
-            per_view = readout.disparity_under_cursor / (readout.grid.columns - 1)
-            words += f"  D {number(readout.disparity_under_cursor, 2)} px, {number(per_view, 2)} per view"
+            words += f"  D {disparity_words(readout.disparity_under_cursor, readout.grid.columns)}"
         hint = "Pixel under the cursor, and its disparity: over the baseline, and per captured view"
         if readout.captions:
             hint = "Pixel under the cursor, and its value in a map"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from imgui_bundle import ImVec2, ImVec4, imgui
@@ -24,6 +24,8 @@ BARE = (
 FIXED = BARE | imgui.WindowFlags_.no_bring_to_front_on_focus.value | imgui.WindowFlags_.no_background.value
 CARD = BARE | imgui.WindowFlags_.always_auto_resize.value
 PASSIVE = CARD | imgui.WindowFlags_.no_inputs.value  # a card that is only looked at
+LABELS = 4.6  # em, the column in which the labels of controls stand
+_VALUES = 4.1  # em, beside sliders: "-99.99 px" and a gap
 DASH = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
@@ -33,9 +35,24 @@ def number(value: float, decimals: int) -> str:
     return f"{value:.{decimals}f}".replace("-", MINUS)
 
 
+def capital(words: str) -> str:
+    """The words as they begin a sentence, or an entry of a list."""
+    return words[:1].upper() + words[1:]
+
+
+def disparity_words(disparity: float, columns: int) -> str:
+    """A disparity over the baseline, and per captured view of a grid with so many columns."""
+    return f"{number(disparity, 2)} px, {number(disparity / (columns - 1), 3)} per view"
+
+
 def decibels(value: float) -> str:
     """A PSNR, which is infinite where two pictures are equal."""
     return f"{number(value, 2)} dB" if math.isfinite(value) else "equal"
+
+
+def counted(count: int, one: str, more: str | None = None) -> str:
+    """So many of something; `more`: what several are called where that is not `one` with an s."""
+    return f"{count} {one if count == 1 else more or f'{one}s'}"
 
 
 def milliseconds(value: float) -> str:
@@ -50,7 +67,8 @@ def em() -> float:
 
 @contextmanager
 def window(name: str, rect: Rect, flags: int = FIXED, padding: ImVec2 | None = None) -> Iterator[None]:
-    """A window at a fixed place."""
+    """A window at a fixed place. Where the frame is broken off inside it, imgui tidies up when the frame is ended, or never
+    if the program ends: to end a window within a list or a style that nobody ends would be a fault of its own."""
     imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(ImVec2(rect.width, rect.height))
     if padding is not None:
@@ -58,15 +76,37 @@ def window(name: str, rect: Rect, flags: int = FIXED, padding: ImVec2 | None = N
     imgui.begin(name, None, flags)
     if padding is not None:
         imgui.pop_style_var()
-    try:
+    yield
+    imgui.end()
+
+
+@contextmanager
+def panel(name: str, rect: Rect) -> Iterator[None]:
+    """A window at the side, whose scrollbar lies in its margin; contents stand in a `column`."""
+    padding = imgui.get_style().window_padding
+    inner = Rect(rect.x + padding.x, rect.y, rect.width - padding.x, rect.height)
+    with window(name, inner, FIXED & ~imgui.WindowFlags_.no_scrollbar.value, ImVec2(0, padding.y)):
         yield
-    finally:
-        imgui.end()
+
+
+@contextmanager
+def column(name: str, width: float) -> Iterator[None]:
+    """Contents of this width, with a scrollbar beside them or without: so nothing moves when one appears."""
+    imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 0))
+    shown = imgui.begin_table(name, 1, 0, ImVec2(width, 0))
+    if shown:
+        imgui.table_next_row()
+        imgui.table_next_column()
+    imgui.pop_style_var()
+    yield
+    if shown:
+        imgui.end_table()
 
 
 @contextmanager
 def card(name: str, area: Rect, pivot: tuple[float, float], width: float, flags: int = CARD) -> Iterator[None]:
-    """A card over the picture: `pivot` (0 to 1) is where it sits in the area, and which point of it sits there."""
+    """A card over the picture: `pivot` (0 to 1) is where it sits in the area, and which point of it sits there. A frame that is
+    broken off is as in `window`."""
     margin = em()
     place = ImVec2(
         area.x + margin + (area.width - 2 * margin) * pivot[0],
@@ -81,20 +121,16 @@ def card(name: str, area: Rect, pivot: tuple[float, float], width: float, flags:
     imgui.begin(name, None, flags)
     imgui.pop_style_var(2)
     imgui.pop_style_color()
-    try:
-        yield
-    finally:
-        imgui.end()
+    yield
+    imgui.end()
 
 
 @contextmanager
 def font(face: imgui.ImFont, size: float = theme.FONT_SIZE) -> Iterator[None]:
     """Text in this face and size (before scaling)."""
     imgui.push_font(face, size)
-    try:
-        yield
-    finally:
-        imgui.pop_font()
+    yield
+    imgui.pop_font()
 
 
 def text(words: str, colour: ImVec4 = theme.TEXT) -> None:
@@ -107,19 +143,52 @@ def text(words: str, colour: ImVec4 = theme.TEXT) -> None:
 def wrapped(words: str, colour: ImVec4 = theme.TEXT) -> None:
     """Text broken into lines at the window's edge."""
     imgui.push_style_color(imgui.Col_.text, colour)
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(readable(words))
-    imgui.pop_text_wrap_pos()
+    _in_lines(words, imgui.get_content_region_avail().x)
     imgui.pop_style_color()
+
+
+def _in_lines(words: str, width: float) -> None:
+    """Text in lines of this width; a word that is wider is broken by imgui, wherever it likes."""
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
+    imgui.text_unformatted(broken(readable(words), width))
+    imgui.pop_text_wrap_pos()
+
+
+def broken(words: str, width: float) -> str:
+    """The words in lines that are broken at spaces only, while imgui would also break them after the dots of file names."""
+    if imgui.calc_text_size(words).x <= width:
+        return words
+    lines = []
+    for paragraph in words.split("\n"):
+        line, *rest = paragraph.split(" ")
+        for word in rest:
+            longer = f"{line} {word}"
+            if imgui.calc_text_size(longer).x <= width:
+                line = longer
+            else:
+                lines.append(line)
+                line = word
+        lines.append(line)
+    return "\n".join(lines)
 
 
 def heading(words: str, fonts: theme.Fonts) -> None:
     """The title of a section, with a rule above it."""
+    rule()
+    title(words, fonts)
+
+
+def rule() -> None:
+    """A line between sections."""
     spacing = imgui.get_style().item_spacing
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, em() * 0.38))
     imgui.dummy(ImVec2(0, 0))
     imgui.separator()
     imgui.pop_style_var()
+
+
+def title(words: str, fonts: theme.Fonts) -> None:
+    """The title alone, of the first section in a tab, or of a table."""
     with font(fonts.bold, theme.SMALL):
         text(words, theme.TEXT_SOFT)
 
@@ -129,9 +198,7 @@ def tooltip(words: str) -> None:
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip.value):
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(em() * 0.6, em() * 0.45))
         if imgui.begin_tooltip():
-            imgui.push_text_wrap_pos(em() * 22)
-            imgui.text_unformatted(readable(words))
-            imgui.pop_text_wrap_pos()
+            _in_lines(words, em() * 21.4)
             imgui.end_tooltip()
         imgui.pop_style_var()
 
@@ -143,14 +210,27 @@ def button(label: str, command: str, context: commands.Context, width: float = 0
     tooltip(commands.COMMANDS[command].tooltip)
 
 
-def row(label: str, command: str, selected: bool, context: commands.Context) -> None:
-    """A row of a list that runs the named command, with the key at its right end."""
-    _choice(label, command, selected, context, imgui.get_content_region_avail().x, theme.PANEL)
-
-
-def tile(label: str, command: str, selected: bool, context: commands.Context, width: float) -> None:
-    """As `row`, but a button of this width."""
-    _choice(label, command, selected, context, width, theme.FIELD)
+def tile(label: str, command: str, selected: bool, context: commands.Context, width: float, why_not: str = "") -> None:
+    """A button of this width that runs the named command, with the key at its right end; one of several to choose from.
+    why_not: why it cannot be pressed."""
+    imgui.begin_disabled(bool(why_not))
+    height = imgui.get_frame_height()
+    corner = imgui.get_cursor_screen_pos()
+    if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
+        commands.run(command, context)
+    fill = theme.ACCENT_DEEP if selected else theme.FIELD_HOVERED if imgui.is_item_hovered() else theme.FIELD
+    tooltip(why_not or commands.COMMANDS[command].tooltip)
+    brush = imgui.get_window_draw_list()
+    end = ImVec2(corner.x + width, corner.y + height)
+    brush.add_rect_filled(corner, end, packed(fill), imgui.get_style().frame_rounding)
+    pad = em() * 0.55
+    y = corner.y + (height - em()) / 2
+    brush.add_text(ImVec2(corner.x + pad, y), packed(theme.TEXT), label)
+    key = commands.COMMANDS[command].keys[0]
+    x = end.x - pad - imgui.calc_text_size(key).x
+    if x - corner.x - pad > imgui.calc_text_size(label).x:  # the tooltip tells it in any case
+        brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
+    imgui.end_disabled()
 
 
 def tab(label: str, command: str, selected: bool, context: commands.Context, width: float, fonts: theme.Fonts) -> None:
@@ -189,25 +269,6 @@ def pairs(name: str, rows: Sequence[tuple[str, str]]) -> None:
     imgui.pop_style_var()
 
 
-def _choice(label: str, command: str, selected: bool, context: commands.Context, width: float, ground: ImVec4) -> None:
-    height = imgui.get_frame_height()
-    corner = imgui.get_cursor_screen_pos()
-    if imgui.invisible_button(f"{label}##{command}", ImVec2(width, height)):
-        commands.run(command, context)
-    fill = theme.ACCENT_DEEP if selected else theme.FIELD_HOVERED if imgui.is_item_hovered() else ground
-    tooltip(commands.COMMANDS[command].tooltip)
-    brush = imgui.get_window_draw_list()
-    end = ImVec2(corner.x + width, corner.y + height)
-    brush.add_rect_filled(corner, end, packed(fill), imgui.get_style().frame_rounding)
-    pad = em() * 0.55
-    y = corner.y + (height - em()) / 2
-    brush.add_text(ImVec2(corner.x + pad, y), packed(theme.TEXT), label)
-    key = commands.COMMANDS[command].keys[0]
-    x = end.x - pad - imgui.calc_text_size(key).x
-    if x - corner.x - pad > imgui.calc_text_size(label).x:  # the tooltip tells it in any case
-        brush.add_text(ImVec2(x, y), packed(theme.TEXT_SOFT if selected else theme.TEXT_FAINT), key)
-
-
 def switch(label: str, command: str, on: bool, context: commands.Context) -> None:
     """A box to tick that runs the named command, with the key at the right end of the line."""
     right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - em() * 0.55
@@ -221,24 +282,27 @@ def switch(label: str, command: str, on: bool, context: commands.Context) -> Non
     text(key, theme.TEXT_FAINT)
 
 
-def choice(label: str, value: str, choices: Sequence[str], hint: str) -> str:
-    """A list that opens, behind its label. Returns what is chosen."""
+def labelled(words: str) -> None:
+    """The label of the control that comes next, which stands in line with all others."""
     imgui.align_text_to_frame_padding()
-    text(label, theme.TEXT_SOFT)
-    imgui.same_line(4.5 * em())
+    text(words, theme.TEXT_SOFT)
+    imgui.same_line(imgui.get_cursor_start_pos().x + LABELS * em())
+
+
+def choice(label: str, value: str, choices: Sequence[str], hint: str, shown_as: Callable[[str], str] = str) -> str:
+    """A list that opens, behind its label. Returns what is chosen. shown_as: what an entry is called on screen."""
+    labelled(label)
     imgui.set_next_item_width(imgui.get_content_region_avail().x)
     shown = choices.index(value) if value in choices else 0
-    _, index = imgui.combo(f"##{label}", shown, list(choices))
+    _, index = imgui.combo(f"##{label}", shown, [shown_as(each) for each in choices])
     tooltip(hint)
     return choices[index]
 
 
 def slider(label: str, value: float, limits: tuple[float, float], shown: str, hint: str, flags: int = 0) -> float:
     """A slider between its label and its value, which stay clear of the grab. Returns the value."""
-    imgui.align_text_to_frame_padding()
-    text(label, theme.TEXT_SOFT)
-    imgui.same_line(4.5 * em())
-    value_width = max(3.4 * em(), imgui.calc_text_size(shown).x + 0.5 * em())
+    labelled(label)
+    value_width = max(_VALUES * em(), imgui.calc_text_size(shown).x + 0.5 * em())
     imgui.set_next_item_width(imgui.get_content_region_avail().x - value_width)
     changed, moved = imgui.slider_float(f"##{label}", value, *limits, "", flags | imgui.SliderFlags_.always_clamp.value)
     tooltip(hint)

@@ -10,10 +10,11 @@ from moving_scene import light_field
 from test_panels import GRID, OPEN, Screen
 
 from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement, Difference
+from app.foresight import captured_viewpoints
 from app.keyboard import _KEYS
 from app.panes import arrange, handle
 from app.readout import Compared, ScoreText
-from app.sidebar.score_map import Summary, is_novel, summary
+from app.sidebar.score_map import Summary, is_novel, scored_words, summary
 from app.state import Grid, Look, Tab
 from lfcore.protocols import novel_views
 
@@ -72,6 +73,36 @@ def test_the_handle_is_dragged_with_the_mouse_and_leaves_the_viewpoint_alone(scr
     assert screen.state.comparison.wipe == 0
     screen.drag((area.x + 1, 300), (90, 0))  # it can be taken at the edge, too
     assert screen.state.comparison.wipe > 0.05
+
+
+def test_where_there_is_no_partner_there_is_no_handle(screen: Screen) -> None:
+    screen.readout = replace(THERE, captured_here=None, compared=Compared())
+    screen.press("W")
+    x = handle(screen.state.comparison, screen.layout.picture)
+    screen.drag((x, 200), (-90, 0))
+    assert screen.state.comparison.wipe == 0.5
+    assert screen.state.u > 0.5  # the picture is dragged there, as anywhere
+
+
+@pytest.mark.parametrize("key", ["W", "D", "3"])
+def test_where_there_is_no_captured_view_the_way_to_one_is_offered(screen: Screen, key: str) -> None:
+    """And to another partner: in the part of the window that has nothing to show."""
+    screen.readout = replace(THERE, captured_here=None, compared=Compared())
+    screen.press(key)
+    screen.frame(3)
+    area = arrange(screen.state, screen.layout.picture)[-1].clip
+    middle = area.x + area.width / 2
+    done = set()
+    for y in range(int(area.height / 2), int(area.height / 2) + 60, 4):
+        for x in (middle - 120, middle + 20):
+            screen.state.move_to(0.5, 0.5)
+            screen.state.comparison = replace(screen.state.comparison, partner=CAPTURED_VIEW)
+            screen.click(x, y)
+            if GRID.at(screen.state.u, screen.state.v) is not None:
+                done.add("nearest")
+            if screen.state.comparison.partner == INSTANT:
+                done.add("partner")
+    assert done == {"nearest", "partner"}
 
 
 def test_beside_the_handle_the_picture_is_dragged_as_ever(screen: Screen) -> None:
@@ -192,6 +223,28 @@ def test_the_summary_leaves_out_inputs_and_dark_views() -> None:
         scores[index] = ScoreText(psnr, 0.9, "K16")
     scores[7] = None
     assert summary(grid, tuple(scores)) == Summary(4, 3, 33.0, 30.0, 35.0)
+
+
+def test_the_tab_counts_scores_as_the_status_line_does() -> None:
+    """Of all captured views but the dark ones, inputs among them."""
+    grid = Grid(3, 3, *SIZE, frozenset({(0, 1)}))
+    scores = [ScoreText(99.0, 1.0, "K16") if index in (0, 3, 4) else None for index in range(9)]
+    readout = replace(OPEN, model="full", compared=Compared(views=tuple(scores)))
+    assert scored_words(readout, grid) == f"3 of {len(captured_viewpoints(grid))}"
+    never = replace(readout, compared=Compared(never_scored=frozenset({"full"})))
+    assert scored_words(never, grid) == "none"
+
+
+@pytest.mark.parametrize(("side", "offered"), [(8, True), (2, False)])
+def test_all_views_can_be_scored_where_some_are_no_inputs(screen: Screen, side: int, offered: bool) -> None:
+    screen.readout = replace(THERE, grid=Grid(side, side, *SIZE), captured_here=None)
+    screen.state.tab = Tab.COMPARE
+    screen.frame(3)
+    if offered:
+        screen.find_in_panel(lambda: screen.state.score_all)
+    else:
+        with pytest.raises(AssertionError):
+            screen.find_in_panel(lambda: screen.state.score_all)
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(7, 7), (8, 8), (3, 5), (2, 2)])

@@ -59,6 +59,13 @@ def test_keys_add_and_remove_key_frames_and_play(screen: Screen) -> None:
     assert not export.playing
 
 
+def test_a_key_frame_that_comes_or_goes_is_seen_in_its_tab(screen: Screen) -> None:
+    for key in ("K", "Shift+K"):
+        screen.state.tab, screen.state.panel = Tab.LOOK, False
+        screen.press(key)
+        assert (screen.state.tab, screen.state.panel) == (Tab.EXPORT, True)
+
+
 def palette(screen: Screen, words: str) -> None:
     """Run the first command that the palette finds for these words."""
     screen.press("Ctrl+P")

@@ -127,7 +127,7 @@ def test_the_slider_goes_to_the_pictures_of_the_stack_only(screen: Screen) -> No
     assert panel is not None
     state.exhibit = 4
     _, y = screen.find_in_panel(lambda: state.exhibit == 0, "left")  # near the slider's left end
-    x = np.linspace(panel.x + 0.24 * panel.width, panel.x + 0.76 * panel.width, 60)
+    x = np.linspace(panel.x + 0.3 * panel.width, panel.x + 0.725 * panel.width, 60)
     seen = []
     for place_ in x:
         screen.click(float(place_), y)

@@ -154,6 +154,14 @@ def test_slices_follow_the_cursor_until_they_are_pinned(screen: Screen) -> None:
     assert screen.layout.strips is None
 
 
+def test_slices_that_are_hidden_stay_so_when_they_are_let_go(screen: Screen) -> None:
+    chord(screen, "U")
+    assert screen.state.focusing.slices and screen.state.focusing.pin is not None  # to pin them shows them
+    screen.press("U")
+    chord(screen, "U")
+    assert (screen.state.focusing.slices, screen.state.focusing.pin) == (False, None)
+
+
 def test_a_drag_in_a_slice_moves_the_viewpoint_along_it(screen: Screen) -> None:
     state = screen.state
     screen.press("U")

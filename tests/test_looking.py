@@ -38,7 +38,21 @@ def test_the_level_of_the_sweep_goes_by_keys_and_leads_to_the_sweep(screen: Scre
     screen.press("PgUp")
     screen.press("PgDn")
     assert screen.state.look is Look.SWEEP_DEVIATION
-    assert screen.state.looking.level == pytest.approx(2 * LEVEL_STEP)
+    assert screen.state.looking.level == pytest.approx(1.5 * LEVEL_STEP)  # the first one was half a step from 0
+
+
+@pytest.mark.parametrize("start", [0.0, -7.31, 20.9, 33.3])
+def test_the_keys_go_from_one_level_of_the_network_to_the_next(start: float) -> None:
+    """And beyond its last one in the same steps."""
+    limits = (-30.0, 40.0)
+    up, down = (Looking(level=start).at_next_level(step, limits) for step in (1, -1))
+    assert start < up.level < start + LEVEL_STEP
+    assert start - LEVEL_STEP < down.level < start
+    for level in (up.level, down.level, up.at_next_level(1, limits).level):
+        place = (level - LEVELS[0]) / LEVEL_STEP
+        assert place == pytest.approx(round(place), abs=1e-6)
+    assert up.at_next_level(-1, limits).level == pytest.approx(down.level)
+    assert up.at_next_level(1, limits).level - up.level == pytest.approx(LEVEL_STEP)
 
 
 def test_tone_and_exposure_go_by_keys(screen: Screen) -> None:

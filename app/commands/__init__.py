@@ -67,11 +67,15 @@ COMMANDS: dict[str, Command] = {
 # What the mouse does, for the F1 page.
 GESTURES: tuple[tuple[str, str, str], ...] = (
     (MOVING, "Drag", "Move the viewpoint: turn the scene as if by hand"),
-    (FOCUSING, "Shift + click", "Focus on what is under the cursor"),
+    (MOVING, "Click or drag in the pad", "Move the viewpoint there"),
+    (FOCUSING, "Shift + click", "Focus on what is under the cursor; while refocusing, a click does"),
+    (FOCUSING, "Click or drag in a slice", "Move u or v there"),
+    (COMPARING, "Drag the handle", "Wipe"),
     (ZOOMING, "Wheel", "Zoom about the cursor"),
     (ZOOMING, "Double click", "Fit, or 1:1 about the cursor"),
-    (ZOOMING, "Right drag, Space + drag", "Move the picture"),
-    (EXPORTING, "Right click in the pad", "Add or remove a key frame"),
+    (ZOOMING, "Right drag, middle drag, Space + drag", "Move the picture"),
+    (EXPORTING, "Right click in the pad", "In the tab Export: add or remove a key frame"),
+    (PROGRAM, "Ctrl + click on a slider", "Type its value"),
     (PROGRAM, "Drop", "Open a file or folder, or choose from several"),
 )
 

@@ -10,14 +10,16 @@ from app.state import Look, Tab
 
 
 def _add(context: Context) -> None:
-    """With the focus of the tab Focus; where the picture is refocused, the path is too."""
+    """With the focus of the tab Focus; where the picture is refocused, the path is too. The tab shows what has become of it."""
     state = context.state
+    state.tab, state.panel = Tab.EXPORT, True
     state.export.add_key_frame(state.u, state.v, state.focusing.focus)
     if state.look is Look.REFOCUS:
         state.export.refocus, state.export.aperture = True, state.focusing.aperture
 
 
 def _remove(context: Context) -> None:
+    context.state.tab, context.state.panel = Tab.EXPORT, True
     context.state.export.remove_last_key_frame()
 
 

@@ -57,11 +57,11 @@ def _slices(context: Context) -> None:
 
 
 def _pin(context: Context) -> None:
-    """Pin slices where the cursor is, or let them follow it again."""
+    """Pin slices where the cursor is, which are then shown, or let them follow it again."""
     state = context.state
     middle = (context.picture[0] / 2, context.picture[1] / 2)
     pin = None if state.focusing.pin is not None else state.cursor or middle
-    state.focusing = replace(state.focusing, pin=pin, slices=True)
+    state.focusing = replace(state.focusing, pin=pin, slices=state.focusing.slices or pin is not None)
 
 
 def _stereo(context: Context) -> None:

@@ -13,17 +13,9 @@ from app.geometry import Rect, Size
 from app.state import Grid, ViewState
 
 # Groups of the F1 page.
-LOOKING, MOVING, ZOOMING, PROGRAM = "Ways of looking", "Viewpoint", "Picture", "Program"
-INSIDE, TONES = "Inside the synthesis", "Tone and colours"
-
-
-COMPARING = "Comparing"
-
-
-EXPORTING = "Export"
-
-
-FOCUSING = "Focus, slices, stereo"
+LOOKING, INSIDE, TONES = "Ways of looking", "Inside the synthesis", "Tone and colours"
+COMPARING, FOCUSING, EXPORTING = "Comparing", "Focus, slices, stereo", "Export"
+MOVING, ZOOMING, PROGRAM = "Viewpoint", "Picture", "Program"
 
 
 class Action(Enum):

@@ -38,7 +38,7 @@ def _head(context: Context, shelf: Shelf, fonts: theme.Fonts) -> None:
         text(elided(_name(folder), width))
     if folder is not None:
         where = f" in {folder.path}" if folder.path is not None else ""
-        text(elided(f"{len(folder.members)} files and folders{where}", width), theme.TEXT_SOFT)
+        text(elided(f"{len(folder.members)} to choose from{where}", width), theme.TEXT_SOFT)
         tooltip(str(folder.path or ""))
     else:
         text("Listing the folder" if shelf.listing else "No folder is listed", theme.TEXT_SOFT)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
-from app.comparison import BLOCK_RANGE, CAPTURED_VIEW, INSTANT, Arrangement, Difference
+from app.comparison import BLOCK_RANGE, CAPTURED_VIEW, INSTANT, NO_CAPTURED_VIEW, Arrangement, Difference
 from app.geometry import Rect, Size
 from app.limits import within
 from app.panes import Pane, handle
@@ -55,13 +55,13 @@ def partner_name(state: ViewState, readout: Readout) -> str:
         of_what_is_shown = state.look is Look.SYNTHESIS and readout.step is not Step.CAPTURED
         return f"{partner}{TAG_GAP}{score_words(score)}" if score is not None and of_what_is_shown else partner
     if partner == CAPTURED_VIEW:
-        return "no captured view here"
+        return NO_CAPTURED_VIEW
     return f"{partner}: not yet" if partner != INSTANT else "no disparity yet"
 
 
 def score_words(score: ScoreText) -> str:
     """How far two pictures are apart, and by which protocol."""
-    return f"{decibels(score.psnr)}, SSIM {number(score.ssim, 4)}, {score.protocol.partition(':')[0]}"
+    return f"PSNR {decibels(score.psnr)}, SSIM {number(score.ssim, 4)}, {score.protocol.partition(':')[0]}"
 
 
 def difference_name(state: ViewState) -> str:
@@ -93,10 +93,10 @@ def cross_hairs(panes: tuple[Pane, ...], state: ViewState, picture: Size) -> Non
         brush.pop_clip_rect()
 
 
-def wipe_handle(area: Rect, panes: tuple[Pane, ...], state: ViewState) -> None:
-    """The line between the two pictures, which the mouse can take."""
+def wipe_handle(area: Rect, panes: tuple[Pane, ...], state: ViewState, readout: Readout) -> None:
+    """The line between the two pictures, which the mouse can take; none where there is but one."""
     comparison = state.comparison
-    if len(panes) == 1 or comparison.arrangement is not Arrangement.WIPE:
+    if len(panes) == 1 or comparison.arrangement is not Arrangement.WIPE or not readout.compared.there:
         return
     reach = _REACH * em() / theme.FONT_SIZE
     x = handle(comparison, area)

@@ -10,7 +10,7 @@ from app.readout import Readout
 from app.samples import Part, Samples
 from app.state import Look, ViewState
 from app.tone import toned
-from app.widgets import DASH, PASSIVE, card, em, number, packed, text
+from app.widgets import DASH, PASSIVE, card, disparity_words, em, number, packed, text
 from lfcore.lightfield import CORNERS, FloatArray
 
 _CORNER_NAMES = {(0.0, 0.0): "top left", (1.0, 0.0): "top right", (0.0, 1.0): "bottom left", (1.0, 1.0): "bottom right"}
@@ -19,7 +19,7 @@ _NAMES = 5.7  # em, the column of names
 
 
 def inspector(area: Rect, state: ViewState, readout: Readout) -> None:
-    """Place, viewpoint, values and error; in the corner where the cursor is not."""
+    """Place, viewpoint, values and difference; in the corner where the cursor is not."""
     if not state.inspector or area.width < 30 * em() or area.height < 20 * em():
         return
     part = _under(state)
@@ -30,7 +30,7 @@ def inspector(area: Rect, state: ViewState, readout: Readout) -> None:
         _row("Viewpoint", f"u {number(state.u, 4)}   v {number(state.v, 4)}")
         samples = readout.samples
         if part is None or samples is None or not samples.holds(part):
-            for name in ("Stored", "Shown", "Disparity", "Error"):
+            for name in ("Stored", "Shown", "Disparity", "Difference"):
                 _row(name, DASH)
             if state.look in _DETAILS:
                 _row(_DETAILS[state.look], DASH)
@@ -42,7 +42,7 @@ def inspector(area: Rect, state: ViewState, readout: Readout) -> None:
         _row("Shown", _row_of(255 * shown, 0))
         _row("Disparity", _disparity(samples, part, readout))
         error = samples.error(part)
-        _row("Error", DASH if error is None else f"{_row_of(255 * error[0, 0], 1)}  of 255")
+        _row("Difference", DASH if error is None else f"{_row_of(255 * error[0, 0], 1)}  of 255")
         if state.look in _DETAILS:
             _row(_DETAILS[state.look], _detail(samples, part, state))
 
@@ -73,8 +73,7 @@ def _stored(samples: Samples, part: Part, state: ViewState) -> FloatArray:
 def _disparity(samples: Samples, part: Part, readout: Readout) -> str:
     if samples.disparity is None or readout.grid is None:
         return DASH
-    value = float(samples.disparity[part.top, part.left])
-    return f"{number(value, 2)} px,  {number(value / (readout.grid.columns - 1), 3)} per view"
+    return disparity_words(float(samples.disparity[part.top, part.left]), readout.grid.columns)
 
 
 def _detail(samples: Samples, part: Part, state: ViewState) -> str:

@@ -10,7 +10,7 @@ from app.desk import Card
 from app.geometry import Rect
 from app.readout import Readout
 from app.settings import SCALE_LIMITS, Theme
-from app.widgets import CARD, button, card, choice, em, font, heading, switch, text, tooltip, wrapped
+from app.widgets import CARD, button, card, choice, em, font, heading, labelled, switch, text, tooltip, wrapped
 
 
 def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -35,7 +35,7 @@ def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts)
         heading("Remembered", fonts)
         wrapped("Window, panel, these settings, recent files, and how each file was looked at.", theme.TEXT_SOFT)
         imgui.begin_disabled(not readout.shelf.recent)
-        button("Forget recent files", "forget", context)
+        button("Forget files and how they were looked at", "forget", context)
         imgui.end_disabled()
         imgui.same_line()
         if imgui.button("Done"):
@@ -46,9 +46,7 @@ def settings(area: Rect, context: Context, readout: Readout, fonts: theme.Fonts)
 def _scale(context: Context) -> None:
     """The scale in steps, or that of the monitor."""
     desk = context.state.desk
-    imgui.align_text_to_frame_padding()
-    text("Scale", theme.TEXT_SOFT)
-    imgui.same_line(4.5 * em())
+    labelled("Scale")
     square = imgui.get_frame_height()
     imgui.begin_disabled(context.scale <= SCALE_LIMITS[0])
     button("-", "smaller", context, square)

@@ -8,29 +8,28 @@ from imgui_bundle import ImVec2, imgui
 
 from app import theme
 from app.commands import Context
-from app.comparison import CAPTURED_VIEW, INSTANT, Arrangement, Difference, partners
+from app.comparison import CAPTURED_VIEW, INSTANT, NO_CAPTURED_VIEW, Arrangement, Difference, partners
 from app.readout import Readout, ScoreText
 from app.scoring import RULES
 from app.sidebar import score_map
 from app.state import GAIN_LIMITS, Look
-from app.widgets import DASH, choice, decibels, em, heading, number, slider, text, tile, tooltip
+from app.widgets import DASH, capital, choice, decibels, em, heading, number, rule, slider, text, tile, title, tooltip
 
 NEVER_SCORED = "Not scored: captured views are its inputs"
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     """The whole tab."""
-    heading("The picture against its partner", fonts)
+    title("The picture against its partner", fonts)
     _partner(context, readout)
     _arrangement(context)
     _difference(context)
     _score(context, readout)
-    heading("Models at this view", fonts)
-    _table(readout)
+    rule()
+    _table(readout, fonts)
     if readout.grid is not None:
         total = score_map.summary(readout.grid, readout.compared.views)
-        scored = f"{total.scored} of {total.views}" if readout.model not in readout.compared.never_scored else "none"
-        heading(f"All captured views: {scored} scored", fonts)
+        heading(f"All captured views: {score_map.scored_words(readout, readout.grid)} scored", fonts)
         score_map.draw(context, readout, readout.grid, total)
 
 
@@ -39,7 +38,8 @@ def _partner(context: Context, readout: Readout) -> None:
     before = state.comparison.partner
     hint = "What the picture is compared with: the camera's own view, the corner views warped by the newest disparity, "
     hint += "another model.  (Q: the next one)"
-    chosen = choice("Partner", before, partners(readout.models, readout.model), hint)
+    offered = partners(readout.models, readout.model)
+    chosen = choice("Partner", before, offered, hint, lambda each: capital(each) if each == CAPTURED_VIEW else each)
     if chosen != before:
         state.comparison = replace(state.comparison, partner=chosen)
 
@@ -61,7 +61,7 @@ def _difference(context: Context) -> None:
     state = context.state
     before = state.comparison.difference
     hint = "How the difference from the partner is drawn; 3 shows it, 1 the picture again.  (E: the next kind)"
-    chosen = Difference(choice("Error", before.value, [each.value for each in Difference], hint))
+    chosen = Difference(choice("Difference", before.value, [each.value for each in Difference], hint, capital))
     if chosen is not before:
         state.comparison = replace(state.comparison, difference=chosen)
         state.look = Look.ERROR
@@ -82,7 +82,7 @@ def _score(context: Context, readout: Readout) -> None:
     if score is None:
         text(_why_no_score(context, readout), theme.TEXT_FAINT)
         return
-    text(f"{decibels(score.psnr)}    SSIM {number(score.ssim, 4)}")
+    text(f"PSNR {decibels(score.psnr)}    SSIM {number(score.ssim, 4)}")
     tooltip(f"The synthesis against its partner, from the very values that are shown. {score.protocol}")
 
 
@@ -92,18 +92,19 @@ def _why_no_score(context: Context, readout: Readout) -> str:
         return NEVER_SCORED
     if partner == CAPTURED_VIEW:
         there = readout.captured_here is not None
-        return "Scored when the synthesis is there" if there else "No captured view at this viewpoint"
+        return "Scored when the synthesis is there" if there else NO_CAPTURED_VIEW
     return "Scored when the hand rests" if partner == INSTANT else "Scored when both syntheses are there"
 
 
-def _table(readout: Readout) -> None:
+def _table(readout: Readout, fonts: theme.Fonts) -> None:
     """PSNR and SSIM of each model against the captured view."""
-    hint = "Computed when the hand rests" if readout.compared.table else "No captured view at this viewpoint"
+    hint = "Computed when the hand rests" if readout.compared.table else NO_CAPTURED_VIEW
     table = readout.compared.table or tuple((name, None) for name in readout.models)
     best = max((score.psnr for _, score in table if score is not None), default=None)
     imgui.push_style_var(imgui.StyleVar_.cell_padding, ImVec2(0, 0))
     if imgui.begin_table("models", 3):
-        imgui.table_setup_column("model", imgui.TableColumnFlags_.width_stretch.value, 1.3)
+        imgui.table_setup_column("model", imgui.TableColumnFlags_.width_stretch.value, 1.5)
+        _head(fonts)
         for name, score in table:
             imgui.table_next_row()
             imgui.table_next_column()
@@ -112,6 +113,14 @@ def _table(readout: Readout) -> None:
             _cells(score, score is not None and score.psnr == best, why_none)
         imgui.end_table()
     imgui.pop_style_var()
+
+
+def _head(fonts: theme.Fonts) -> None:
+    """What stands in the columns."""
+    imgui.table_next_row()
+    for words in ("Models at this view", "PSNR", "SSIM"):
+        imgui.table_next_column()
+        title(words, fonts)
 
 
 def _cells(score: ScoreText | None, best: bool, hint: str) -> None:

@@ -17,18 +17,34 @@ from app.limits import within
 from app.progress import clock
 from app.readout import Readout
 from app.state import Grid
-from app.widgets import button, choice, elided, em, font, heading, number, slider, text, tooltip, typed, wrapped
+from app.widgets import (
+    button,
+    capital,
+    choice,
+    counted,
+    elided,
+    em,
+    font,
+    heading,
+    labelled,
+    number,
+    slider,
+    text,
+    tooltip,
+    typed,
+    wrapped,
+)
 from lfcore.key_frames import MAX_FOCUS
 from lfcore.quilt import MAX_VIEWS
 from lfcore.sweep_plan import GAIN_LIMITS, MAX_FPS, MAX_PLAYS, Layer
+from lfcore.sweep_target import Kind
 
 _Chosen = TypeVar("_Chosen", bound=Enum)
 
-_LABEL = 4.5  # em, as in app.widgets
 _LEAST_FPS = 0.1
 _MOST_FRAMES = 9_999  # that can be typed; a file may say more
 _ESLF_SIDE = 14  # views that an ESLF holds along each side
-_SAME_MODEL = "as in the window"
+_SAME_MODEL = "As in the window"
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -36,6 +52,7 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     choices = context.state.export
     imgui.dummy(ImVec2(0, 0))
     choices.product = _chosen("What", choices.product, Product, "What is exported")
+    _go(context, choices, readout, fonts)
     if choices.product is Product.SWEEP:
         _path(context, choices, fonts)
         _frames(choices)
@@ -47,7 +64,7 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
 
 def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
     heading("Path", fonts)
-    choices.shape = choice("Shape", choices.shape, SHAPES, "The way of the viewpoint, at even speed")
+    choices.shape = choice("Shape", choices.shape, SHAPES, "The way of the viewpoint, at even speed", capital)
     if choices.shape == KEY_FRAMES:
         count = len(choices.key_frames)
         width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
@@ -74,9 +91,7 @@ def _path(context: Context, choices: ExportChoices, fonts: theme.Fonts) -> None:
 
 def _length(choices: ExportChoices) -> None:
     """How many frames at which rate, in one line."""
-    imgui.align_text_to_frame_padding()
-    text("Frames", theme.TEXT_SOFT)
-    imgui.same_line(_LABEL * em())
+    labelled("Frames")
     imgui.set_next_item_width(4.4 * em())
     _, frames = imgui.input_int("##frames", choices.frames, 0)
     choices.frames = within(frames, (1, max(_MOST_FRAMES, choices.frames)))
@@ -113,7 +128,7 @@ def _focus(choices: ExportChoices) -> None:
 
 def _frames(choices: ExportChoices) -> None:
     layers = {layer: name for name, layer in LAYERS.items()}
-    hint = "What the frames show. Errors are shown at captured views only."
+    hint = "What the frames show. Differences are shown at captured views only."
     choices.layer = LAYERS[choice("Show", layers[choices.layer], tuple(LAYERS), hint)]
     if choices.layer is Layer.ERROR:
         logarithmic = imgui.SliderFlags_.logarithmic.value
@@ -172,6 +187,11 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
     _folder(context, choices)
     _take_keyboard(choices, "Name")
     choices.name = _typed("Name", choices.name, "The file's name, without the ending of its kind")
+
+
+def _go(context: Context, choices: ExportChoices, readout: Readout, fonts: theme.Fonts) -> None:
+    """The button, and below it why it cannot be pressed, what it replaces, or how long the video will be: where all of it is
+    seen together."""
     fault = choices.fault
     imgui.begin_disabled(bool(fault))
     button("Export", "export", context, imgui.get_content_region_avail().x)
@@ -182,7 +202,8 @@ def _file(context: Context, choices: ExportChoices, readout: Readout, fonts: the
         elif readout.grid is not None and os.path.isfile(choices.made((readout.grid.width, readout.grid.height))):  # noqa: PTH113  False, too, where it may not be asked
             wrapped("Replaces the file of that name", theme.WARNING)
         elif choices.product is Product.SWEEP:
-            text(f"{choices.frames / choices.fps:.1f} s", theme.TEXT_FAINT)
+            lasts = f"{choices.frames / choices.fps:.1f} s of video"
+            text(lasts if choices.format.kind is Kind.VIDEO else counted(choices.frames, "frame"), theme.TEXT_FAINT)
 
 
 def _folder(context: Context, choices: ExportChoices) -> None:
@@ -263,9 +284,7 @@ def _chosen(label: str, value: _Chosen, kind: type[_Chosen], hint: str) -> _Chos
 
 def _labelled(label: str, room: float = 0.0) -> None:
     """The label of a field that fills the line, but for `room` at its end."""
-    imgui.align_text_to_frame_padding()
-    text(label, theme.TEXT_SOFT)
-    imgui.same_line(_LABEL * em())
+    labelled(label)
     imgui.set_next_item_width(imgui.get_content_region_avail().x - room)
 
 

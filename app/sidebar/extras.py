@@ -10,12 +10,13 @@ from app.geometry import Rect
 from app.readout import Caption, Readout
 from app.sidebar.header import open_and_close
 from app.state import ViewState
-from app.widgets import FIXED, button, elided, font, heading, number, slider, text, tooltip, window, wrapped
+from app.widgets import button, column, elided, font, heading, number, panel, slider, text, tooltip, wrapped
 
 
 def draw(rect: Rect, context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     """The whole panel; the readout has at least one caption."""
-    with window("extras panel", rect, FIXED & ~imgui.WindowFlags_.no_scrollbar.value):
+    width = rect.width - 2 * imgui.get_style().window_padding.x
+    with panel("extras panel", rect), column("file", width):
         _file(context, readout, fonts)
         stack = [caption.focus for caption in readout.captions if caption.focus is not None]  # the first captions are its
         if len(stack) > 1:

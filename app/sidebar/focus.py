@@ -11,13 +11,13 @@ from app.commands import Context
 from app.focusing import APERTURE_LIMITS, BASELINE_LIMITS, Choice
 from app.readout import Readout
 from app.state import Look
-from app.widgets import button, choice, font, heading, number, slider, switch, text
+from app.widgets import button, capital, choice, font, heading, number, slider, switch, text, title
 
 _STEREO = {
-    Look.SYNTHESIS: "none",
-    Look.ANAGLYPH: "red and cyan glasses",
-    Look.STEREO_PARALLEL: "side by side",
-    Look.STEREO_CROSSED: "for crossed eyes",
+    Look.SYNTHESIS: "None",
+    Look.ANAGLYPH: "Red and cyan glasses",
+    Look.STEREO_PARALLEL: "Side by side",
+    Look.STEREO_CROSSED: "For crossed eyes",
 }
 _CHOICES = tuple(each.value for each in Choice)
 
@@ -30,7 +30,7 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
 
 
 def _refocus(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
-    heading("Refocus", fonts)
+    title("Refocus", fonts)
     state = context.state
     switch("Refocus", "refocus", state.look is Look.REFOCUS, context)
     before = state.focusing
@@ -50,7 +50,7 @@ def _refocus(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
         "The views that are summed up. Captured: the camera's own. Synthesized: 9 × 9, carried from the newest synthesis by "
         "its disparity. Automatic: captured ones where they lie so close that what is out of focus is smooth.  (Shift+V)"
     )
-    views = Choice(choice("Views", before.views.value, _CHOICES, hint))
+    views = Choice(choice("Views", before.views.value, _CHOICES, hint, capital))
     if views is not before.views:
         state.focusing = replace(state.focusing, views=views)
     with font(fonts.regular, theme.SMALL):

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from app import theme
 from app.commands import Context
 from app.readout import Readout
-from app.widgets import button, elided, font, text, tooltip, wrapped
+from app.widgets import button, counted, elided, font, text, tooltip, wrapped
 
 
 def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
@@ -19,7 +19,8 @@ def draw(context: Context, readout: Readout, fonts: theme.Fonts) -> None:
     tooltip(readout.source or "No light field is open")
     if grid is not None:
         text(f"{grid.columns} × {grid.rows} views of {grid.width} × {grid.height} px", theme.TEXT_SOFT)
-        tooltip("\n".join([readout.kind, *(f"{name}: {value}" for name, value in readout.facts)]))
+        order = f"{counted(grid.columns, 'column')}, {counted(grid.rows, 'row')}"
+        tooltip("\n".join([readout.kind, order, *(f"{name}: {value}" for name, value in readout.facts)]))
         for warning in readout.warnings:
             wrapped(warning, theme.WARNING)
     else:

@@ -12,14 +12,14 @@ from app.looking import RANGE_LIMITS, level_limits
 from app.readout import Readout
 from app.state import GAIN_LIMITS, TAIL_LIMITS, Look
 from app.tone import CURVE_MEANING, GAMMA_LIMITS, STOPS_LIMITS, Curve
-from app.widgets import choice, em, heading, number, slider, switch, text, tile, tooltip, typed
+from app.widgets import choice, em, heading, labelled, number, slider, switch, tile, tooltip, typed
 from lfcore.colormaps import ColourMap
 from lfcore.nearest_inputs import NEIGHBOURS
 
 _TILES = (
     ("Synthesis", "synthesis", Look.SYNTHESIS),
     ("Disparity", "disparity", Look.DISPARITY),
-    ("Error", "error", Look.ERROR),
+    ("Difference", "error", Look.ERROR),
     ("Warped inputs", "warped", Look.WARPED_ALL),
     ("Top left", "top left", Look.WARPED_TOP_LEFT),
     ("Top right", "top right", Look.WARPED_TOP_RIGHT),
@@ -27,8 +27,8 @@ _TILES = (
     ("Bottom right", "bottom right", Look.WARPED_BOTTOM_RIGHT),
     ("Leaning", "lean", Look.LEAN),
     ("Disagreement", "disagreement", Look.DISAGREEMENT),
-    ("Sweep mean", "sweep mean", Look.SWEEP_MEAN),
-    ("Sweep deviation", "sweep deviation", Look.SWEEP_DEVIATION),
+    ("Sweep", "sweep mean", Look.SWEEP_MEAN),
+    ("Deviation", "sweep deviation", Look.SWEEP_DEVIATION),
 )
 _LOGARITHMIC = imgui.SliderFlags_.logarithmic.value
 
@@ -102,20 +102,20 @@ def _of_this_look(context: Context, readout: Readout, fonts: theme.Fonts) -> Non
         _colour_map(context)
         _gain(context, "The map goes up to white divided by this.  (, and .)")
     elif look is Look.ERROR:
-        heading("Error", fonts)
-        _gain(context, "The error is shown this many times as bright.  (, and .)")
+        heading("Difference", fonts)
+        _gain(context, "The difference is shown this many times as bright.  (, and .)")
     elif look is Look.LEAN and readout.weighed:
         heading("Weights", fonts)
-        _gain(context, "Weights are raised to this power, so that small differences are seen.  (, and .)", "Contrast")
+        _gain(context, "Weights are raised to this power, so that small differences are seen.  (, and .)", "Contrast", "^")
     elif look is Look.SWEEP_MEAN:
         heading("Plane sweep", fonts)
     if look.is_sweep:
         _level(context)
 
 
-def _gain(context: Context, hint: str, label: str = "Gain") -> None:
+def _gain(context: Context, hint: str, label: str = "Gain", sign: str = "×") -> None:
     state = context.state
-    state.gain = slider(label, state.gain, GAIN_LIMITS, f"× {state.gain:.1f}", hint, _LOGARITHMIC)
+    state.gain = slider(label, state.gain, GAIN_LIMITS, f"{sign} {state.gain:.1f}", hint, _LOGARITHMIC)
 
 
 def _colour_map(context: Context) -> None:
@@ -134,9 +134,7 @@ def _range(context: Context, readout: Readout) -> None:
         hint = "So many per cent of the disparities at either end of the range share the last colour.  (, and .)"
         state.tail = slider("Cut off", state.tail, TAIL_LIMITS, f"{state.tail:.1f} %", hint)
     else:
-        imgui.align_text_to_frame_padding()
-        text("From, to", theme.TEXT_SOFT)
-        imgui.same_line(4.5 * em())
+        labelled("From, to")
         imgui.set_next_item_width(imgui.get_content_region_avail().x)
         changed, low, high = imgui.drag_float_range2("##range", *hand_range, 0.02, *RANGE_LIMITS, "%.2f", "%.2f")
         tooltip("Disparities of the first and the last colour, px over the baseline: drag, or Ctrl + click and type.")

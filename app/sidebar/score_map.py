@@ -45,15 +45,25 @@ def is_novel(grid: Grid, index: int) -> bool:
     return divmod(index, grid.columns) not in grid.dark and grid.position(index) not in CORNERS
 
 
+def scored_words(readout: Readout, grid: Grid) -> str:
+    """How many of all captured views but the dark ones have a score, which is what the status line counts too."""
+    if readout.model in readout.compared.never_scored:
+        return "none"
+    scored = sum(score is not None for score in readout.compared.views)
+    return f"{scored} of {grid.rows * grid.columns - len(grid.dark)}"
+
+
 def draw(context: Context, readout: Readout, grid: Grid, total: Summary) -> None:
     """The grid, and beside it what it comes to."""
     _cells(context, readout, grid, total, round(0.38 * imgui.get_content_region_avail().x))
     imgui.same_line()
     imgui.begin_group()
-    rows = [("mean", total.mean), ("least", total.least), ("greatest", total.greatest)]
+    rows = [("mean PSNR", total.mean), ("least", total.least), ("greatest", total.greatest)]
     pairs("views", [(name, DASH if value is None else decibels(value)) for name, value in rows])
     _bar()
-    tile("Score all", "score all", context.state.score_all, context, imgui.get_content_region_avail().x)
+    why_not = "" if total.views else "All captured views are inputs, or dark: there is none that is synthesized from others."
+    on = context.state.score_all and not why_not
+    tile("Score all", "score all", on, context, imgui.get_content_region_avail().x, why_not)
     imgui.end_group()
 
 
@@ -95,7 +105,7 @@ def _colour(readout: Readout, grid: Grid, index: int, total: Summary) -> ImVec4:
 
 def _words(readout: Readout, grid: Grid, index: int) -> str:
     row, column = divmod(index, grid.columns)
-    name = f"View {row + 1}, {column + 1}"
+    name = f"Row {row + 1}, column {column + 1}"
     if (row, column) in grid.dark:
         return f"{name}: too dark to be used"
     if grid.position(index) in CORNERS:
@@ -105,7 +115,7 @@ def _words(readout: Readout, grid: Grid, index: int) -> str:
     if score is None:
         why = "not scored yet" if readout.model not in readout.compared.never_scored else "an input, not scored"
         return f"{name}: {why}. A click goes there."
-    return f"{name}: {decibels(score.psnr)}, SSIM {number(score.ssim, 4)} ({score.protocol}). A click goes there."
+    return f"{name}: PSNR {decibels(score.psnr)}, SSIM {number(score.ssim, 4)} ({score.protocol}). A click goes there."
 
 
 def _bar() -> None:

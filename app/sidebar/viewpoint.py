@@ -44,4 +44,4 @@ def _captured_name(readout: Readout) -> str:
     if readout.captured_here is None or readout.grid is None:
         return "in between"
     line, column = divmod(readout.captured_here, readout.grid.columns)
-    return f"view {line + 1}, {column + 1}"
+    return f"row {line + 1}, column {column + 1}"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from imgui_bundle import ImVec2, imgui
+import functools
+
+from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import theme
 from app.export_choices import KEY_FRAMES, drawn_path
 from app.geometry import Point
 from app.readout import Readout
-from app.state import Tab, ViewState
+from app.state import Grid, Tab, ViewState
 from app.widgets import em, packed, tooltip
+from lfcore.cache import rounded
 from lfcore.lightfield import EXTRAPOLATION_LIMIT
 
 _SPAN = 1 + 2 * EXTRAPOLATION_LIMIT
@@ -32,7 +35,7 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
         tooltip("Drag to move the viewpoint. Line: the path; a right click adds or removes a key frame.  (K, Shift+K)")
     elif not imgui.is_item_active():
         tooltip(
-            "Click or drag to move the viewpoint. Dots: captured views, the larger ones the inputs; blue: in the cache; "
+            "Click or drag to move the viewpoint. Dots: captured views, the larger ones the inputs. Blue: what is in memory; "
             "rim: extrapolated.  (Arrows)"
         )
 
@@ -56,10 +59,8 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     grid = readout.grid
     if grid is not None:
         radius = min(em() * 0.14, size / _SPAN / max(grid.rows, grid.columns) * 0.25)
-        for index in range(grid.rows * grid.columns):
-            place = divmod(index, grid.columns)
-            given = place in readout.inputs
-            colour = theme.FIELD_ACTIVE if place in grid.dark else theme.TEXT if given else theme.TEXT_SOFT
+        for index, colour in enumerate(dot_colours(grid, readout.cached, readout.inputs)):
+            given = divmod(index, grid.columns) in readout.inputs
             brush.add_circle_filled(at(grid.position(index)), (1.7 if given else 1.0) * radius, packed(colour), _DOT_SIDES)
     if exporting:
         for stop in drawn_path(state.export):
@@ -72,3 +73,23 @@ def draw(state: ViewState, readout: Readout, size: float) -> None:
     brush.add_circle_filled(here, em() * 0.3, packed(theme.ACCENT))
     brush.add_circle(here, em() * 0.3, packed(theme.TEXT if on_captured else theme.BACKGROUND), 0, em() * 0.1)
     brush.pop_clip_rect()
+
+
+@functools.lru_cache(maxsize=2)  # in most frames all is as in the one before
+def dot_colours(grid: Grid, cached: tuple[Point, ...], inputs: frozenset[tuple[int, int]]) -> tuple[ImVec4, ...]:
+    """Of the captured views, of which those at `cached` viewpoints are in memory, and those in the rows and columns of `inputs`
+    are given to the model."""
+    kept = frozenset(cached)
+    places = (divmod(index, grid.columns) for index in range(grid.rows * grid.columns))
+    return tuple(
+        _colour(place in grid.dark, rounded(*grid.position(index)) in kept, place in inputs)
+        for index, place in enumerate(places)
+    )
+
+
+def _colour(dark: bool, kept: bool, given: bool) -> ImVec4:
+    if dark:
+        return theme.FIELD_ACTIVE
+    if kept:
+        return theme.ACCENT
+    return theme.TEXT if given else theme.TEXT_SOFT
