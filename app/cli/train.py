@@ -180,7 +180,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> TrainConfig:
-    from lfcore.training.loop import TrainConfig
+    from lfcore.training.loop import TrainConfig, check_patches
     from lfcore.training.loss import LossConfig
     from lfcore.training.patches import PatchConfig
 
@@ -189,7 +189,7 @@ def _config(options: argparse.Namespace) -> TrainConfig:
     except ValueError as error:
         asked = f"--patch {options.patch} --batch {options.batch} --group {options.group}"
         raise InputError(f"{asked} will not do: {error}.") from error
-    return TrainConfig(
+    config = TrainConfig(
         steps=options.steps,
         learning_rate=options.lr,
         decay_share=options.decay,
@@ -201,6 +201,8 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         model=options.model,
         revival_steps=options.revival,
     )
+    check_patches(config, options.teacher is not None)
+    return config
 
 
 def _generated(options: argparse.Namespace) -> list[TrainingScene]:
