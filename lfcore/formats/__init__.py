@@ -18,7 +18,7 @@ from lfcore.formats.lytro.contents import Kind, read_contents
 from lfcore.formats.lytro.extras import describe as describe_container
 from lfcore.lightfield import LightField
 
-__all__ = ["coarse_light_field", "describe", "open_light_field"]
+__all__ = ["coarse_light_field", "describe", "files_of", "open_light_field"]
 
 _VIEWS = 8  # side of the middle square of views, as in the paper
 
@@ -64,6 +64,21 @@ def open_light_field(
         f"{path} is a picture of {header.size} px, which is neither whole 14 x 14 px microlenses nor one view among "
         f"others in its folder; expected {_KINDS}."
     )
+
+
+def files_of(path: str | os.PathLike[str]) -> list[Path]:
+    """The files that a light field is read from: the views of a folder, or of that around a view, else the file itself.
+
+    Contents are not looked at: a picture that might be a view, or an ESLF, counts as both. Empty where there is nothing.
+    """
+    path = Path(path)
+    if not path.exists():
+        return []
+    try:
+        views = list(views_folder.grid_of(path).files.values()) if views_folder.sniff(path) else []
+    except (InputError, OSError):
+        views = []  # opening it will say why
+    return views if path.is_dir() else [path, *views]
 
 
 def coarse_light_field(path: str | os.PathLike[str]) -> LightField | None:

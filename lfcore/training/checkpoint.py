@@ -17,6 +17,8 @@ from lfcore.atomic import atomic_path
 from lfcore.errors import InputError
 from lfcore.training.curve import CurvePoint
 
+CHECKPOINT = "checkpoint.safetensors"  # its name in a run folder
+
 # What may differ between a run and its continuation: how long it lasts.
 _CONTINUABLE = ("steps", "decay_share")
 

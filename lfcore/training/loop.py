@@ -31,7 +31,7 @@ from lfcore.models import Model
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
 from lfcore.training.architectures import Batch, architecture
-from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lfcore.training.checkpoint import CHECKPOINT, Checkpoint, load_checkpoint, save_checkpoint
 from lfcore.training.clearing import clear
 from lfcore.training.curve import CurvePoint, column_names, write_curve
 from lfcore.training.loss import LossConfig, StepLoss
@@ -160,7 +160,7 @@ def train(
         k16_view(light_field)
         check_size(light_field, "K16")
     config = _settled(config, initial, teacher, team)
-    trainer = Trainer(config, _device(runtime.device), run_dir, initial.model if initial else None, team, teacher)
+    trainer = Trainer(config, device_of(runtime.device), run_dir, initial.model if initial else None, team, teacher)
     prepared = [prepare_scene(scene) for scene in scenes]
     check_room([*prepared, *generated], config.patches, trainer.levels)
     prepared = mixed(prepared, generated, config.generated_share)
@@ -265,7 +265,7 @@ class Trainer:
 
     @property
     def _checkpoint_path(self) -> Path:
-        return self._run_dir / "checkpoint.safetensors"
+        return self._run_dir / CHECKPOINT
 
     def draw(self, scenes: Sequence[TrainingScene], step: int) -> list[PatchGroup]:
         """This process's share of the patches of one step, by the seed and the step's number alone."""
@@ -435,9 +435,10 @@ def learning_rate(config: TrainConfig, step: int) -> float:
     return config.learning_rate * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * min(falling, 1))))
 
 
-def _device(name: str) -> torch.device:
+def device_of(name: str) -> torch.device:
+    """Where to compute: cpu, cuda, or auto, which is cuda where there is one. Raises InputError where there is none."""
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("No CUDA device was found; use --device cpu.")
+        raise InputError("There is no CUDA device that torch can use here; train with --device cpu or auto.")
     return torch.device(name)
