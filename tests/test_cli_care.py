@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -151,14 +152,13 @@ def test_sentences_of_eval_say_which_light_field_they_are_about() -> None:
     assert _named(Path("a/b.png"), "a/b.png is truncated.") == "a/b.png is truncated."
 
 
-def test_a_folder_that_cannot_be_read_is_left_to_whoever_opens_it(scene: Path, tmp_path: Path) -> None:
-    locked = tmp_path / "locked"
-    locked.mkdir(mode=0o000)
-    tmp_path.chmod(0o755)
-    for parent in (tmp_path.parent, tmp_path.parent.parent):
-        parent.chmod(0o755)
-    with without_privileges():
-        assert scenes_in([locked, locked / "inside", scene]) == [locked, locked / "inside", scene]
+def test_a_folder_that_cannot_be_read_is_left_to_whoever_opens_it() -> None:
+    with tempfile.TemporaryDirectory() as place:  # below pytest's folders root alone may look
+        Path(place).chmod(0o755)
+        scene, locked = write_views(Path(place) / "scene"), Path(place) / "locked"
+        locked.mkdir(mode=0o000)
+        with without_privileges():
+            assert scenes_in([locked, locked / "inside", scene]) == [locked, locked / "inside", scene]
 
 
 def test_want_of_memory_fails_one_capture_alone(

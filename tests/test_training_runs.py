@@ -23,7 +23,7 @@ from lfcore.networks import FullModel, ModelConfig
 from lfcore.planesweep import Levels
 from lfcore.training import loop
 from lfcore.training.architectures import Batch, architecture
-from lfcore.training.curve import column_names
+from lfcore.training.curve import CurvePoint, column_names
 from lfcore.training.loop import Progress, Runtime, TrainConfig, Trainer, check_patches, prepare_scene, train
 from lfcore.training.loss import LossConfig, StepLoss
 from lfcore.training.patches import PatchConfig, TrainingScene, sample_group
@@ -236,3 +236,20 @@ def test_weights_are_given_as_weights(tmp_path: Path, scene: LightField) -> None
     )
     found = load_weights(out)
     assert found.model.config == given.config and found.training["config"]["initial"] == "digest"
+
+
+def test_all_names_of_scenes_are_inside_the_picture_of_a_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+    from lfcore.training import plot as module
+
+    written: dict[str, tuple[int, int]] = {}
+    monkeypatch.setattr(module, "_text", lambda page, x, y, text, *colour: written.update({text: (x, y)}))
+    for count in (1, 5, 8, 30):
+        written.clear()
+        names = [f"scene {k:02}" for k in range(count)]
+        module.plot([CurvePoint(k, 0, 1e-4, 0.1, dict.fromkeys(names, 30.0 + k)) for k in (1, 2, 3)])
+        shown = sorted(x for text, (x, y) in written.items() if y == 24)
+        assert len(shown) == min(count, 8) and min(np.diff([*shown, 900])) >= 95
+        assert ("+ 23" in written) == (count == 30)
+        steps = sorted((x, text) for text, (x, y) in written.items() if text.isdecimal())
+        assert [text for _, text in steps] == ["0", "1", "2", "3"]
+        assert (np.diff([x for x, _ in steps]) > 200).all()  # evenly
