@@ -12,7 +12,7 @@ import numpy as np
 from lfcore.errors import InputError
 from lfcore.formats import array_files, arrays, eslf, views_folder
 from lfcore.formats.describe import describe
-from lfcore.formats.images import check_memory, read_header
+from lfcore.formats.images import EXTENSIONS, check_memory, read_header
 from lfcore.formats.lytro.container import is_container, open_container
 from lfcore.formats.lytro.contents import Kind, read_contents
 from lfcore.formats.lytro.extras import describe as describe_container
@@ -69,15 +69,16 @@ def open_light_field(
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
     """The files that a light field is read from: the views of a folder, or of that around a view, else the file itself.
 
-    Contents are not looked at: a picture that might be a view, or an ESLF, counts as both. Empty where there is nothing.
+    Empty where nothing can be read, which opening it says in a sentence.
     """
     path = Path(path)
     if not path.exists():
         return []
     try:
-        views = list(views_folder.grid_of(path).files.values()) if views_folder.sniff(path) else []
+        one_picture = path.suffix.lower() in EXTENSIONS and path.is_file() and eslf.has_camera_size(read_header(path))
+        views = [] if one_picture or not views_folder.sniff(path) else list(views_folder.grid_of(path).files.values())
     except (InputError, OSError):
-        views = []  # opening it will say why
+        views = []
     return views if path.is_dir() else [path, *views]
 
 
