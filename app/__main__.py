@@ -1,7 +1,8 @@
 """The command `lfview`: finds the verb, runs it, and turns errors into one sentence and an exit code.
 
-Exit codes: 0 done, 1 a bug of the program, 2 bad input, 130 Ctrl-C, 143 terminated. Imports stay light here and in the verbs'
-modules, so that `lfview --help` answers at once: the window, torch and the readers are imported by the verb that needs them.
+Exit codes: 0 done, 1 a bug of the program, 2 bad input, 130 Ctrl-C, 141 nobody reads on, 143 terminated. Imports stay light
+here and in the verbs' modules, so that `lfview --help` answers at once: the window, torch and the readers are imported by the
+verb that needs them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from types import FrameType
 from typing import NoReturn
 
 from app.cli import bench, cache, decode, evaluate, generate, info, sweep, synth, train, view
-from lfcore.errors import LfviewError
+from lfcore.errors import LfviewError, is_out_of_memory
 from lfcore.patience import wait_shortly
 
 VERBS = {
@@ -78,6 +79,7 @@ class _Version(argparse.Action):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    _open_closed_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _terminate)
@@ -110,11 +112,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _say("lfview: there is no room left for what was to be written; make some, or write elsewhere.")
         return 2
     except Exception as error:
-        if _is_out_of_memory(error):
+        if is_out_of_memory(error):
             _say("lfview: there is not enough memory for this; use a smaller light field or close other programs.")
             return 2
         return _bug(error, options.debug)
     return status
+
+
+def _open_closed_streams() -> None:
+    """What is written to a standard output or error that the caller has closed is for nobody."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115, open to the end
 
 
 def _bug(error: Exception, debug: bool) -> int:
@@ -165,11 +174,6 @@ def _check_not_a_typo(word: str) -> None:
     if near and not Path(word).exists():
         _say(f"lfview: there is no verb or file {word!r}; did you mean {near[0]!r}?")
         raise SystemExit(2)
-
-
-def _is_out_of_memory(error: Exception) -> bool:
-    """Python's MemoryError, or torch's, which is a RuntimeError that says so."""
-    return isinstance(error, MemoryError) or "can't allocate memory" in str(error)
 
 
 def _say(sentence: str) -> None:

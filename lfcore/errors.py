@@ -24,5 +24,10 @@ class OutputError(LfviewError):
     """A target that cannot be written: no permission, no room, no such folder."""
 
 
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether it is Python's MemoryError, or torch's, which is a RuntimeError that says so."""
+    return isinstance(error, MemoryError) or "can't allocate memory" in str(error) or "CUDA out of memory" in str(error)
+
+
 class Cancelled(Exception):
     """Work that was given up because nobody wants its result any more; never shown as an error."""

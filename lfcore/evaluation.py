@@ -15,7 +15,7 @@ from lfcore import colormaps
 from lfcore.errors import InputError
 from lfcore.figures import ByteArray, Cell, Legend, disparity_cell, figure
 from lfcore.lightfield import FloatArray, LightField
-from lfcore.metrics import absolute_error, to_uint8
+from lfcore.metrics import absolute_error, check_size, to_uint8
 from lfcore.nearest_inputs import NEIGHBOURS, NearestInputs
 from lfcore.protocols import K16, Protocol, novel_views
 
@@ -134,6 +134,7 @@ def evaluate_scene(
     view. Raises InputError where the light field does not fit the protocol, and for a model with other inputs.
     """
     check_inputs(synthesizer)
+    check_size(light_field, protocol.name)
     grid = protocol.grid(light_field)
     own = set(protocol.views(grid))
     shown = protocol.shown_view(grid)

@@ -44,6 +44,33 @@ def check_target(path: str | os.PathLike[str], extensions: Collection[str]) -> P
     return target
 
 
+def check_apart(targets: Iterable[str | os.PathLike[str]], inputs: Iterable[str | os.PathLike[str]] = ()) -> None:
+    """Make sure, before long work, that no target is something that is read, and that no two are one, whatever they are called.
+
+    Raises OutputError.
+    """
+    read = {identity for path in inputs for identity in _identities(path)}
+    written: set[object] = set()
+    for target in targets:
+        identities = _identities(target)
+        if read & identities:
+            raise OutputError(f"Cannot write {os.fspath(target)}: it is read for this, and would be lost; choose another name.")
+        if written & identities:
+            raise OutputError(
+                f"Cannot write {os.fspath(target)}: something else is to be written there; give each its own name."
+            )
+        written |= identities
+
+
+def _identities(path: str | os.PathLike[str]) -> set[object]:
+    """By which a path is known to be the same as another: where it leads, and the file that is there."""
+    identities: set[object] = {os.path.realpath(path)}
+    with contextlib.suppress(OSError):
+        facts = Path(path).stat()
+        identities.add((facts.st_dev, facts.st_ino))
+    return identities
+
+
 def check_folder(folder: Path) -> None:
     """Make sure that files can be made in this existing folder, by making one. Raises OutputError."""
     if not folder.is_dir():
@@ -136,11 +163,15 @@ def write_map(path: str | os.PathLike[str], values: FloatArray, note: str) -> No
 
 def write_warped(folder: str | os.PathLike[str], warped: FloatArray, extension: str) -> list[Path]:
     """Write the four warped inputs (4, H, W, 3) as warped_u0_v0, warped_u0_v1, ... in the folder; returns the paths."""
-    directory = make_folder(folder)
-    paths = [directory / f"warped_u{u:.0f}_v{v:.0f}{extension}" for u, v in CORNERS]
+    paths = warped_paths(make_folder(folder), extension)
     for path, image in zip(paths, warped, strict=True):
         write_image(path, image)
     return paths
+
+
+def warped_paths(folder: str | os.PathLike[str], extension: str) -> list[Path]:
+    """Where `write_warped` writes the inputs, in the order of CORNERS."""
+    return [Path(folder) / f"warped_u{u:.0f}_v{v:.0f}{extension}" for u, v in CORNERS]
 
 
 def write_rows(path: str | os.PathLike[str], size: tuple[int, int], bands: Iterable[npt.NDArray[np.uint8]]) -> None:

@@ -86,10 +86,9 @@ class FileStore:
         return len(files), sum(file.size for file in files)
 
     def clear(self) -> None:
-        """Remove all of them, but not what another program is just writing."""
-        for file in self._files():
-            if not _is_being_written(file):
-                remove(file.path)
+        """Remove all of them, but not what another program is just writing. Raises OutputError where some cannot be removed."""
+        stuck = sum(not remove(file.path) for file in self._files() if not _is_being_written(file))
+        check_all_removed(stuck, self.folder)
 
     def room_for(self, key: str, size: int) -> Path:
         """Where to write the file under this key, once those used longest ago have made room for it. Raises OutputError."""
@@ -125,6 +124,12 @@ def remove(path: Path) -> bool:
     except OSError:
         return False
     return True
+
+
+def check_all_removed(stuck: int, folder: Path) -> None:
+    """Raise OutputError where so many files of a store could not be removed."""
+    if stuck:
+        raise OutputError(f"Cannot remove {stuck} files below {folder}; look whether they are yours to remove.")
 
 
 @cache

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lfcore.errors import InputError
-from lfcore.lightfield import CORNERS, FloatArray, LightField
+from lfcore.lightfield import FloatArray, LightField
 
 AnyArray = npt.NDArray[np.generic]
 DoubleArray = npt.NDArray[np.float64]
@@ -30,6 +30,7 @@ _SSIM_TAPS = np.exp(-(np.arange(-SSIM_RADIUS, SSIM_RADIUS + 1) ** 2) / (2 * _SSI
 _SSIM_TAPS /= _SSIM_TAPS.sum()
 _BLOCK_ROWS = 64  # a block of the filter's matrix this high has few zeros, and lies in the processor's cache
 PSNR_BLOCK = 16  # pixels
+_WINDOWS = {"K16": 1, "7x7-Y": 2 * SSIM_RADIUS + 1, "8x8-BGR": _FLAT_WINDOW}  # px that a protocol's crop must leave
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def squared_error(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def k16(synthesized: FloatArray, truth: FloatArray) -> Score:
     """Score two float pictures (H, W, 3), 1 = white, by the paper's protocol: 8 bits first, 22 px cropped per side."""
-    inside = _inside(truth, "K16", 1)
+    inside = _inside(truth, "K16")
     a, b = to_uint8(synthesized)[inside], to_uint8(truth)[inside]
     return Score(psnr(a, b), ssim(a, b))
 
@@ -118,7 +119,7 @@ def luma_score(synthesized: FloatArray, truth: FloatArray) -> Score:
     the captured view from its 8 bits and rounded to 8 bits, that of the synthesis as it is; the peak is 255 although Y
     spans 219. SSIM is that of one channel with a Gaussian window of 11 x 11, its outermost 5 px left out of the mean.
     """
-    inside = _inside(truth, "7x7-Y", 2 * SSIM_RADIUS + 1)
+    inside = _inside(truth, "7x7-Y")
     found, captured = (picture[inside] for picture in luma_pair(synthesized, truth))
     mean_square = float(np.mean((captured - found) ** 2))
     similarity = luma_similarity(found, captured).mean()
@@ -131,7 +132,7 @@ def channel_score(synthesized: FloatArray, truth: FloatArray) -> Score:
     As in the published test (SADenseNet, 2021): both in 8 bits; the mean over the channels of each one's PSNR in dB, and of
     each one's SSIM with a flat window of 7 x 7 and variances with N - 1, the outermost 3 px left out of its mean.
     """
-    inside = _inside(truth, "8x8-BGR", _FLAT_WINDOW)
+    inside = _inside(truth, "8x8-BGR")
     a, b = to_uint8(synthesized)[inside], to_uint8(truth)[inside]
     pairs = [(a[..., channel], b[..., channel]) for channel in range(3)]
     return Score(
@@ -164,26 +165,39 @@ def studio_luma(image: AnyArray) -> DoubleArray:
 def k16_view(light_field: LightField) -> tuple[int, int]:
     """(row, column), from 0, of the view that K16 scores: (4, 4) of 8 x 8, the middle one of 7 x 7.
 
-    Raises InputError where that view is itself one of the four inputs.
+    Raises InputError where no view lies between the corners along both axes.
     """
-    row, column = light_field.rows // 2, light_field.columns // 2
-    if light_field.position(row, column) in CORNERS:
-        raise InputError(
-            f"{light_field.name}: found only the four corner views, which are the input; a score needs a captured view "
-            f"in between (at least 3 x 3 views)."
-        )
-    return row, column
+    rows, columns = light_field.rows, light_field.columns
+    if min(rows, columns) < 3:
+        found = "only the four corner views, which are the input" if rows == columns else f"{rows} x {columns} views"
+        raise InputError(f"{light_field.name}: found {found}; a score needs a captured view in between (at least 3 x 3 views).")
+    return rows // 2, columns // 2
 
 
-def _inside(truth: FloatArray, protocol: str, window: int) -> tuple[slice, slice]:
-    """What is left of a picture after the crop; it must hold SSIM's `window`, px."""
+def check_size(light_field: LightField, protocol: str) -> None:
+    """Raise InputError, which names the light field, where its views are too small for a protocol (K16, 7x7-Y, 8x8-BGR)."""
+    small = _too_small(light_field.height, light_field.width, protocol)
+    if small:
+        raise InputError(f"{light_field.name}: the {small}")
+
+
+def _too_small(height: int, width: int, protocol: str) -> str:
+    """What to say of views too small for the protocol's crop and window; nothing where they are not."""
+    least = 2 * K16_CROP + _WINDOWS[protocol]
+    if min(height, width) >= least:
+        return ""
+    return (
+        f"views are {width} x {height} px, but the {protocol} protocol crops {K16_CROP} px on each side; "
+        f"score views of at least {least} x {least} px."
+    )
+
+
+def _inside(truth: FloatArray, protocol: str) -> tuple[slice, slice]:
+    """What is left of a picture after the crop; it must hold SSIM's window."""
     height, width = truth.shape[:2]
-    least = 2 * K16_CROP + window
-    if min(height, width) < least:
-        raise InputError(
-            f"The views are {width} x {height} px, but the {protocol} protocol crops {K16_CROP} px on each side; "
-            f"score views of at least {least} x {least} px."
-        )
+    small = _too_small(height, width, protocol)
+    if small:
+        raise InputError(f"The {small}")
     return slice(K16_CROP, height - K16_CROP), slice(K16_CROP, width - K16_CROP)
 
 

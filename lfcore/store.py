@@ -21,7 +21,16 @@ import numpy as np
 from lfcore.atomic import atomic_path
 from lfcore.cache import CacheKey
 from lfcore.errors import OutputError
-from lfcore.kept_files import LEFTOVER_SECONDS, KeptFile, code_digest, entries, make_room, mark_used, remove
+from lfcore.kept_files import (
+    LEFTOVER_SECONDS,
+    KeptFile,
+    check_all_removed,
+    code_digest,
+    entries,
+    make_room,
+    mark_used,
+    remove,
+)
 from lfcore.synthesis import Synthesis
 
 DEFAULT_LIMIT = 2**30
@@ -32,6 +41,14 @@ _DIGEST_BYTES = 16
 _SUFFIX = ".view"
 _DAY = 86400.0
 _ATTEMPTS = 5
+_MALFORMED = (
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+)  # what reading another header raises
 
 
 @dataclass(frozen=True)
@@ -69,7 +86,7 @@ class ViewStore:
             synthesis = _unpacked(path.read_bytes(), size)
         except OSError:
             return None
-        except (ValueError, KeyError, TypeError):
+        except _MALFORMED:
             remove(path)
             return None
         mark_used(path)
@@ -127,8 +144,7 @@ class ViewStore:
                 stuck += not remove(entry.path)
             with contextlib.suppress(OSError):
                 folder.rmdir()
-        if stuck:
-            raise OutputError(f"Cannot remove {stuck} files below {self.root}; look whether they are yours to remove.")
+        check_all_removed(stuck, self.root)
 
     def _folders(self) -> Iterator[Path]:
         """The folders of views; others are left alone."""
@@ -184,7 +200,7 @@ def _packed(synthesis: Synthesis) -> bytes:
 
 
 def _unpacked(data: bytes, size: tuple[int, int]) -> Synthesis:
-    """The inverse of _packed. Raises ValueError, KeyError or TypeError for anything else."""
+    """The inverse of _packed. Raises one of _MALFORMED for anything else."""
     body, digest = data[:-_DIGEST_BYTES], data[-_DIGEST_BYTES:]
     if not body.startswith(_MAGIC) or hashlib.blake2b(body, digest_size=_DIGEST_BYTES).digest() != digest:
         raise ValueError("damaged")

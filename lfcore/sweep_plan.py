@@ -24,6 +24,7 @@ MAX_PLAYS = 65_535  # what a GIF can count
 MIN_FPS = 0.01
 MAX_FPS = 240.0
 _KEY = "lfview_sweep"
+_LARGEST = 2**53  # whole number in a file; larger ones no float holds
 
 _Choice = TypeVar("_Choice", bound=Enum)
 
@@ -179,7 +180,7 @@ def from_json(value: object) -> SweepPlan:
     if value[_KEY] != VERSION:
         raise InputError(f"the sweep is of version {value[_KEY]!r}, this program knows {VERSION}; update it.")
     fields: Mapping[str, Callable[[str, object], Any]] = {
-        "path": _path_from_json,
+        "path": lambda name, path: _path_from_json(path),
         "frames": _whole,
         "fps": _number,
         "layer": _layer,
@@ -215,7 +216,7 @@ def _path_as_json(path: ViewPath) -> dict[str, Any]:
     return {"closed": path.closed, "key_frames": keys}
 
 
-def _path_from_json(name: str, value: object) -> ViewPath:
+def _path_from_json(value: object) -> ViewPath:
     if not isinstance(value, dict) or ("shape" in value) == ("key_frames" in value):
         raise InputError('the "path" must be an object with either "shape" or "key_frames".')
     if "shape" in value:
@@ -262,6 +263,8 @@ def _number(name: str, value: object) -> float:
 def _whole(name: str, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise InputError(f'"{name}" must be a whole number.')
+    if abs(value) > _LARGEST:
+        raise InputError(f'"{name}" is too large a number.')
     return value
 
 

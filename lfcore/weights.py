@@ -33,13 +33,14 @@ class Weights:
 
 
 def save_weights(path: Path, model: Model, training: Mapping[str, Any]) -> None:
-    """Write the weights of `model` in float32, atomically. `training` (JSON values) says how they came about."""
+    """Write the weights of `model` in float32, atomically. `training` says how they came about: JSON's values, so that
+    numbers are finite."""
     tensors = {name: value.detach().float().cpu().contiguous() for name, value in model.state_dict().items()}
     metadata = {
         "format": FORMAT,
         "config": json.dumps(asdict(model.config)),
         "digest": _digest(asdict(model.config), tensors),
-        "training": json.dumps(training),
+        "training": json.dumps(training, allow_nan=False),
     }
     data = save(tensors, metadata)
     with atomic_path(path) as temporary:
@@ -69,6 +70,8 @@ def load_weights(path: Path) -> Weights:
         raise WeightsError(
             f"{path} holds weights of another shape than {name} has here (of an older version, perhaps); train {name} anew."
         )
+    if other := {value.dtype for value in tensors.values()} - {torch.float32}:
+        raise WeightsError(f"{path} holds weights of type {min(map(str, other))}, expected torch.float32; get a fresh copy.")
     digest = _digest(_json(path, metadata, "config"), tensors)
     if digest != metadata.get("digest"):
         raise WeightsError(f"{path} is damaged: its weights do not match their digest; get a fresh copy.")
@@ -87,8 +90,9 @@ def _config(path: Path, metadata: Mapping[str, str]) -> Config:
 
 def _json(path: Path, metadata: Mapping[str, str], key: str) -> dict[str, Any]:
     try:
-        value = json.loads(metadata.get(key, ""))
-    except ValueError as error:
+        # Files written before say "Infinity", which is no JSON.
+        value = json.loads(metadata.get(key, ""), parse_constant=lambda word: None)
+    except (ValueError, RecursionError) as error:
         raise WeightsError(f"{path} is damaged: its {key} is not readable; get a fresh copy.") from error
     if not isinstance(value, dict):
         raise WeightsError(f"{path} is damaged: its {key} is not a table; get a fresh copy.")

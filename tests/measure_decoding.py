@@ -28,8 +28,8 @@ from lfcore.formats.images import open_picture
 from lfcore.formats.lytro.container import open_container
 from lfcore.formats.lytro.metadata import read_capture
 from lfcore.machine import machine
-from lfcore.plane_scene import patches_scene, slanted_scene
 from tests.camera_truth import decoded_psnr, grid_errors, small, srgb, true_views
+from tests.plane_scenes import patches_scene, slanted_scene
 
 LOW_NOISE = 20_000.0  # electrons of a full pixel; the cameras have about 5,000 at their base sensitivity
 SAMPLES = 6

@@ -18,8 +18,9 @@ from lfcore.errors import Cancelled, InputError
 from lfcore.formats import open_light_field
 from lfcore.formats.lytro.compose import write_illum_capture
 from lfcore.lightfield import LightField
-from lfcore.plane_scene import PlaneScene, patches_scene, slanted_scene
+from lfcore.plane_scene import PlaneScene
 from tests.camera_truth import decoded_psnr, small, srgb, true_picture, true_views, write_model_capture
+from tests.plane_scenes import patches_scene, slanted_scene
 
 LOW_NOISE = 20_000.0
 ILLUM = small(illum(), 560, 460, full_well=LOW_NOISE)

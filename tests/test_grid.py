@@ -13,8 +13,8 @@ from lfcore.decode.grid import LensGrid, regular_grid
 from lfcore.decode.grid_check import check_metadata
 from lfcore.decode.grid_fit import GridNotFound, grid_of_capture, grid_of_white_image
 from lfcore.formats.lytro.metadata import LensletGeometry
-from lfcore.plane_scene import slanted_scene
 from tests.camera_truth import grid_errors, small
+from tests.plane_scenes import slanted_scene
 
 
 def test_centres_form_a_regular_hexagonal_grid() -> None:

@@ -14,6 +14,7 @@ from lfcore.metrics import (
     PSNR_BLOCK,
     absolute_error,
     block_psnr,
+    check_size,
     k16,
     k16_view,
     psnr,
@@ -124,7 +125,7 @@ def test_k16_refuses_views_that_the_crop_would_use_up() -> None:
         k16(small, small)
 
 
-@pytest.mark.parametrize(("grid", "view"), [((8, 8), (4, 4)), ((7, 7), (3, 3)), ((3, 3), (1, 1)), ((2, 5), (1, 2))])
+@pytest.mark.parametrize(("grid", "view"), [((8, 8), (4, 4)), ((7, 7), (3, 3)), ((3, 3), (1, 1)), ((3, 5), (1, 2))])
 def test_k16_scores_the_view_of_the_protocol(grid: tuple[int, int], view: tuple[int, int]) -> None:
     light_field = LightField(np.zeros((*grid, 4, 4, 3), np.uint8), "test", "", "test")
     assert k16_view(light_field) == view
@@ -173,3 +174,17 @@ def test_psnr_of_blocks_is_psnr_of_each() -> None:
     for row, column in ((0, 1), (1, 0), (2, 1), (2, 2)):
         block = (slice(16 * row, 16 * row + 16), slice(16 * column, 16 * column + 16))
         assert found[row, column] == pytest.approx(psnr(a[block], b[block]), abs=1e-4)
+
+
+@pytest.mark.parametrize("grid", [(2, 3), (3, 2), (2, 5)])
+def test_a_view_on_an_edge_is_none_to_score(grid: tuple[int, int]) -> None:
+    views = np.zeros((*grid, 60, 60, 3), np.uint8)
+    with pytest.raises(InputError, match=f"flat: found {grid[0]} x {grid[1]} views; .*at least 3 x 3"):
+        k16_view(LightField(views, "flat", "", ""))
+
+
+@pytest.mark.parametrize(("protocol", "least"), [("K16", 45), ("7x7-Y", 55), ("8x8-BGR", 51)])
+def test_views_too_small_for_a_protocol_are_named(protocol: str, least: int) -> None:
+    check_size(LightField(np.zeros((3, 3, least, least, 3), np.uint8), "flat", "", ""), protocol)
+    with pytest.raises(InputError, match=f"^flat: the views are {least} x {least - 1} px.*at least {least} x {least} px"):
+        check_size(LightField(np.zeros((3, 3, least - 1, least, 3), np.uint8), "flat", "", ""), protocol)

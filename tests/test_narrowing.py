@@ -92,3 +92,9 @@ def test_another_models_file_is_refused_in_a_sentence(tmp_path: Path, capsys: py
         assert main([str(tmp_path / path), str(out), "--data", str(tmp_path)]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     assert not out.exists()
+
+
+def test_the_target_is_checked_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "none" / "w.safetensors"
+    assert main([str(tmp_path / "weights"), str(out), "--data", str(tmp_path)]) == 2
+    assert f"{out.parent}: it does not exist; make the folder first" in capsys.readouterr().err

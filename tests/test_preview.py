@@ -20,8 +20,8 @@ from lfcore.camera_model import illum
 from lfcore.errors import Cancelled, InputError
 from lfcore.formats import coarse_light_field, open_light_field
 from lfcore.lightfield import LightField
-from lfcore.plane_scene import slanted_scene
 from tests.camera_truth import small, write_model_capture
+from tests.plane_scenes import slanted_scene
 
 
 def _until(controller: Controller, condition: Callable[[], bool]) -> None:

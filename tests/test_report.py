@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import base64
 import math
+import os
 import re
+import subprocess
+import sys
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
@@ -186,15 +189,14 @@ def test_curve_files_come_back_as_they_were_written(tmp_path: Path) -> None:
     assert read_curve(tmp_path / "curve.csv") == curve
 
 
-@pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "step,seconds,learning_rate,loss,x\n1,2,3\n", "step,seconds\n\xff"])
+@pytest.mark.parametrize(
+    "text", ["", "name,age\n", "a,b\n1,2\n", "step,seconds,learning_rate,loss,x\n1,2,3\n", "step,seconds\n\xff"]
+)
 def test_other_files_are_no_curve(tmp_path: Path, text: str) -> None:
     path = tmp_path / "curve.csv"
     path.write_bytes(text.encode("latin-1"))
-    if text:
-        with pytest.raises(InputError, match="not a training curve"):
-            read_curve(path)
-    else:
-        assert read_curve(path) == []
+    with pytest.raises(InputError, match="not a training curve"):
+        read_curve(path)
     with pytest.raises(InputError, match="No training curve"):
         read_curve(tmp_path / "none.csv")
 
@@ -222,3 +224,14 @@ def test_a_target_that_cannot_be_written_is_named(tmp_path: Path) -> None:
 def test_pictures_in_the_page_are_png(made: tuple[Report, ScenePanels]) -> None:
     first = str(Reading.of(page(made[0])).all("img")[0]["src"]).partition(",")[2]
     assert base64.b64decode(first).startswith(b"\x89PNG")
+
+
+def test_curves_are_written_in_the_encoding_that_they_are_read_in(tmp_path: Path) -> None:
+    """Whatever that of the system is."""
+    code = (
+        "from pathlib import Path; from lfcore.training.curve import CurvePoint, write_curve; "
+        f"write_curve(Path({str(tmp_path)!r}), [CurvePoint(10, 5, 1e-4, 0.5, {{'W\\xe4ldchen \\u68ee': 25.125}})])"
+    )
+    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1], env=plain, check=True, timeout=60)
+    assert read_curve(tmp_path / "curve.csv")[0].scores == {"Wäldchen 森": 25.125}

@@ -14,8 +14,8 @@ from lfcore.decode.colour import camera_to_screen, gains, stored_values, upright
 from lfcore.decode.shading import lens_profile, light_on_pixels, mend_hot_pixels, relative_light
 from lfcore.formats.lytro.fields import Fields
 from lfcore.formats.lytro.metadata import Capture, capture_of
-from lfcore.plane_scene import slanted_scene
 from tests.camera_truth import small, srgb
+from tests.plane_scenes import slanted_scene
 
 CAMERA = small(illum(), 480, 400, hot_pixels=0.0)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import threading
 import time
@@ -289,3 +291,35 @@ def test_the_verb_says_how_much_there_is_and_removes_it(
     told_in_words = capsys.readouterr().out
     assert "0 views of 0 light fields" in told_in_words and "decoded captures: 0" in told_in_words
     assert "thumbnails: 0" in told_in_words
+
+
+@pytest.mark.parametrize("field", [{"timings": []}, {"u": 10**400}, {"nested": "[" * 1500 + "]" * 1500}])
+def test_a_whole_file_that_says_something_else_is_removed(store: ViewStore, field: dict[str, object]) -> None:
+    store.put(key(), synthesis())
+    path = next(store.root.rglob("*.view"))
+    begin = len(b"lfview view 1\n") + 4
+    data = path.read_bytes()[:-16]
+    length = int.from_bytes(data[begin - 4 : begin], "little")
+    header = json.dumps({**json.loads(data[begin : begin + length]), **field}).encode()
+    if "nested" in field:
+        header = header.replace(b'"[', b"[").replace(b']"', b"]")
+    changed = data[: begin - 4] + len(header).to_bytes(4, "little") + header + data[begin + length :]
+    path.write_bytes(changed + hashlib.blake2b(changed, digest_size=16).digest())
+    assert store.get(key(), SIZE) is None
+    assert not path.exists()
+
+
+def test_what_cannot_be_removed_is_said_and_not_counted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from app.__main__ import main
+
+    monkeypatch.setenv("LFVIEW_CACHE", str(tmp_path))
+    store = ViewStore(tmp_path)
+    store.put(key(0.1), synthesis())
+    thumbnails.default_store().put("a", Glance(None, "Folder, 2 inside"))
+    monkeypatch.setattr("lfcore.kept_files.remove", lambda path: False)
+    assert main(["cache", "--clear"]) == 2
+    output = capsys.readouterr()
+    assert "1 view removed" in output.out and "thumbnails: 0 removed, 0.0 MiB" in output.out
+    assert output.err.startswith("lfview: Cannot remove 1 files below") and output.err.count("\n") == 1

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import save_file
 
 from lfcore.errors import WeightsError
@@ -75,3 +76,28 @@ def test_weights_of_another_model_are_refused(tmp_path: Path) -> None:
     save_file({"weight": torch.zeros(3)}, path, {**metadata, "config": json.dumps(config)})
     with pytest.raises(WeightsError, match="another shape"):
         load_weights(path)
+
+
+def test_weights_of_another_type_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.safetensors"
+    write(path)
+    with safe_open(path, framework="pt") as file:
+        metadata, names = file.metadata(), list(file.keys())
+        tensors = {name: file.get_tensor(name) for name in names}
+    save_file({**tensors, names[0]: tensors[names[0]].bfloat16()}, path, metadata)
+    with pytest.raises(WeightsError, match=r"type torch\.bfloat16, expected torch\.float32"):
+        load_weights(path)
+
+
+@pytest.mark.parametrize("key", ["config", "training"])
+def test_brackets_without_end_are_refused(tmp_path: Path, key: str) -> None:
+    path = tmp_path / "a.safetensors"
+    write(path)
+    with safe_open(path, framework="pt") as file:
+        metadata, tensors = file.metadata(), {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, not a dict
+    save_file(tensors, path, {**metadata, key: "[" * 200_000})
+    with pytest.raises(WeightsError, match=f"its {key} is not readable"):
+        load_weights(path)
+    if key == "training":  # what older versions wrote of equal pictures
+        save_file(tensors, path, {**metadata, key: '{"k16_psnr": {"black": Infinity}}'})
+        assert load_weights(path).training == {"k16_psnr": {"black": None}}

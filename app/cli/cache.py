@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from app.cli.common import Verbs, add_verb, write_json
+from lfcore.errors import OutputError
+
+if TYPE_CHECKING:
+    from lfcore.kept_files import FileStore
+    from lfcore.store import ViewStore
 
 
 def add_parser(verbs: Verbs[Any], name: str) -> None:
@@ -16,9 +22,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "say how much is kept on disk of past syntheses, decoded captures and thumbnails, or remove it",
         "lfview cache --clear\n\nThe environment variable LFVIEW_CACHE names another folder.",
     )
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument("--info", action="store_true", help="say where it is and how much it holds (default)")
-    what.add_argument("--clear", action="store_true", help="remove all of it")
+    parser.add_argument("--clear", action="store_true", help="remove all of it")
     parser.add_argument("--json", action="store_true", help="print JSON instead of text")
     parser.set_defaults(run=run)
 
@@ -30,34 +34,44 @@ def run(options: argparse.Namespace) -> int:
     from lfcore.store import ViewStore
     from lfcore.thumbnails import default_store as thumbnail_store
 
-    store = ViewStore(default_root())
-    decoded = default_store()
-    before = store.usage()
-    captures, captures_bytes = decoded.usage()
-    thumbnails = thumbnail_store()
-    small, small_bytes = thumbnails.usage()
-    if options.clear:
-        store.clear()
-        decoded.clear()
-        thumbnails.clear()
-    usage = store.usage()
+    store, decoded, thumbnails = ViewStore(default_root()), default_store(), thumbnail_store()
+    files = {"decoded captures": decoded, "thumbnails": thumbnails}
+    views_before = store.usage()
+    files_before = {name: kept.usage() for name, kept in files.items()}
+    failures = _clear([store, decoded, thumbnails]) if options.clear else []
+    usage, left = store.usage(), {name: kept.usage() for name, kept in files.items()}
     if options.json:
-        removed = before.views - usage.views
         facts = {"folder": str(store.root), "views": usage.views, "light_fields": usage.light_fields, "bytes": usage.bytes}
-        left, left_bytes = decoded.usage()
-        facts |= {"removed": removed, "decoded_captures": left, "decoded_bytes": left_bytes}
-        left, left_bytes = thumbnails.usage()
-        write_json({**facts, "thumbnails": left, "thumbnail_bytes": left_bytes}, "-")
+        facts["removed"] = views_before.views - usage.views
+        facts |= dict(zip(("decoded_captures", "decoded_bytes"), left["decoded captures"], strict=True))
+        write_json(facts | dict(zip(("thumbnails", "thumbnail_bytes"), left["thumbnails"], strict=True)), "-")
     elif options.clear:
-        print(f"{store.root}: {_views(before.views)} removed, {before.bytes / 2**20:.1f} MiB")
-        print(f"decoded captures: {captures} removed, {captures_bytes / 2**20:.1f} MiB")
-        print(f"thumbnails: {small} removed, {small_bytes / 2**20:.1f} MiB")
+        print(f"{store.root}: {_views(views_before.views - usage.views)} removed, {_mib(views_before.bytes - usage.bytes)}")
+        for name, (count, size) in files_before.items():
+            print(f"{name}: {count - left[name][0]} removed, {_mib(size - left[name][1])}")
     else:
         fields = "1 light field" if usage.light_fields == 1 else f"{usage.light_fields} light fields"
-        print(f"{store.root}: {_views(usage.views)} of {fields}, {usage.bytes / 2**20:.1f} MiB")
-        print(f"decoded captures: {captures}, {captures_bytes / 2**20:.1f} MiB")
-        print(f"thumbnails: {small}, {small_bytes / 2**20:.1f} MiB")
+        print(f"{store.root}: {_views(usage.views)} of {fields}, {_mib(usage.bytes)}")
+        for name, (count, size) in left.items():
+            print(f"{name}: {count}, {_mib(size)}")
+    if failures:
+        raise OutputError(" ".join(failures))
     return 0
+
+
+def _clear(stores: Sequence[ViewStore | FileStore]) -> list[str]:
+    """Clear all of them, also where one cannot be cleared wholly; what there is to say of those."""
+    failures = []
+    for store in stores:
+        try:
+            store.clear()
+        except OutputError as error:
+            failures.append(str(error))
+    return failures
+
+
+def _mib(size: int) -> str:
+    return f"{size / 2**20:.1f} MiB"
 
 
 def _views(count: int) -> str:

@@ -7,6 +7,7 @@ import contextlib
 import json
 import math
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,9 @@ from lfcore.errors import InputError
 
 if TYPE_CHECKING:
     from lfcore.lightfield import LightField
+
+LARGEST = 10**9  # number that any option takes
+_LONGEST_SHOWN = 24  # characters of one that is complained of
 
 Verbs = argparse._SubParsersAction  # argparse has no public name for it
 
@@ -38,7 +42,7 @@ def add_light_field(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--views",
-        type=int,
+        type=whole,
         default=8,
         metavar="N",
         help="side of the middle square of views taken from a raw capture, an ESLF or an array with dark corners (default: 8)",
@@ -80,27 +84,55 @@ def viewpoint(text: str) -> tuple[float, float]:
     return u, v
 
 
+def whole(text: str) -> int:
+    """Parse a whole number, at most LARGEST in size."""
+    if not text.removeprefix("-").isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(_limited(text))
+
+
 def count(text: str) -> int:
-    """Parse a whole number of 1 or more."""
-    if not text.isdecimal() or int(text) < 1:
+    """Parse a whole number from 1 to LARGEST."""
+    if not text.isdecimal() or _limited(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
     return int(text)
 
 
 def count_or_none(text: str) -> int:
-    """Parse a whole number of 0 or more."""
+    """Parse a whole number from 0 to LARGEST."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 0 or more")
-    return int(text)
+    return int(_limited(text))
+
+
+def at_most(limit: int, parse: Callable[[str], int]) -> Callable[[str], int]:
+    """A parser of the same numbers up to a lower limit."""
+
+    def limited(text: str) -> int:
+        value = parse(text)
+        if value > limit:
+            raise argparse.ArgumentTypeError(f"{value} is too large; give at most {limit}")
+        return value
+
+    return limited
 
 
 def positive(text: str) -> float:
-    """Parse a finite number above 0."""
+    """Parse a number above 0 and at most LARGEST."""
     with contextlib.suppress(ValueError):
         value = float(text)
         if 0 < value < math.inf:
-            return value
+            return _limited(text)
     raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+
+
+def _limited(text: str) -> float:
+    """The number, which must not be too large: nothing here asks for more, and libraries may not hold it."""
+    value = float(text)
+    if abs(value) > LARGEST:
+        shown = text if len(text) <= _LONGEST_SHOWN else f"a number of {len(text)} characters"
+        raise argparse.ArgumentTypeError(f"{shown} is too large; give at most {LARGEST}")
+    return value
 
 
 def share(text: str) -> float:
@@ -131,18 +163,30 @@ def open_and_warn(path: Path, views: int = 8) -> LightField:
 def scenes_in(paths: list[Path]) -> list[Path]:
     """The paths, each folder of folders replaced by the folders in it, and another one of light fields by these, sorted.
 
-    Raises InputError for unreadable folders.
+    A folder that cannot be read stays as it is: whoever opens it says so.
     """
+    return [scene for path in paths for scene in _scenes_below(path)]
+
+
+def _scenes_below(path: Path) -> list[Path]:
     from lfcore.formats.collection import members
     from lfcore.formats.images import EXTENSIONS
 
-    scenes: list[Path] = []
-    for path in paths:
+    try:
         children = sorted(path.iterdir()) if path.is_dir() else []
         folders = [child for child in children if child.is_dir() and not child.name.startswith(".")]
         holds_pictures = any(child.suffix.lower() in EXTENSIONS for child in children)
-        scenes += folders if folders and not holds_pictures else sorted(members(path)) or [path]
-    return scenes
+        return folders if folders and not holds_pictures else sorted(members(path)) or [path]
+    except (OSError, InputError):
+        return [path]
+
+
+def check_apart_from(path: Path, targets: Iterable[str | Path | None]) -> None:
+    """Make sure that no target is a file of the light field at `path`, or another target; None is none. Raises OutputError."""
+    from lfcore.export import check_apart
+    from lfcore.formats import files_of
+
+    check_apart([target for target in targets if target is not None], [path, *files_of(path)])
 
 
 def check_all_there(paths: list[Path]) -> None:

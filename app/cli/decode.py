@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.cli.calibration import add_calibration, keep
-from app.cli.common import Verbs, add_verb, count
+from app.cli.common import Verbs, add_verb, count, whole
 from app.progress import Progress
-from lfcore.errors import InputError, LfviewError
+from lfcore.errors import InputError, LfviewError, is_out_of_memory
 
 if TYPE_CHECKING:
     from lfcore.lightfield import LightField
@@ -40,7 +40,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     )
     add_calibration(parser)
     parser.add_argument(
-        "--views", type=int, default=14, metavar="N", help="side of the middle square of the 14 x 14 views (default: 14, all)"
+        "--views", type=whole, default=14, metavar="N", help="side of the middle square of the 14 x 14 views (default: 14, all)"
     )
     parser.add_argument(
         "--as",
@@ -61,21 +61,30 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Decode all captures; those that fail are named, the rest is decoded."""
-    from lfcore.decode.output import captures_in, write_eslf, write_views
+    from lfcore.decode.output import captures_in, facts_path, write_eslf, write_views
     from lfcore.decode.pipeline import DecodeOptions, decode_capture
+    from lfcore.export import check_apart
 
     wanted = DecodeOptions(options.views, options.every_row, options.linear, options.depth)
     captures = captures_in(options.paths)
     kind = options.kind or ("eslf" if options.views == 14 else "views")
     targets = _targets(captures, kind, options)
+    check_apart(
+        [path for target in targets for path in (target, facts_path(target, kind == "eslf"))],
+        [*captures, *([options.calibration] if options.calibration else [])],
+    )
     write: Write = write_eslf if kind == "eslf" else write_views
     jobs = options.jobs or _jobs(len(captures))
 
     def decode(index: int, progress: Callable[[float], None], cancelled: Callable[[], bool]) -> list[Path]:
-        light_field = decode_capture(
-            captures[index], options.calibration, wanted, lambda share: progress(0.7 * share), cancelled
-        )
-        return write(targets[index], light_field)
+        capture = captures[index]
+        try:
+            light_field = decode_capture(capture, options.calibration, wanted, lambda share: progress(0.7 * share), cancelled)
+            return write(targets[index], light_field)
+        except Exception as error:
+            if is_out_of_memory(error):
+                raise InputError(f"{capture}: there is not enough memory to decode it; close other programs.") from error
+            raise
 
     failed = _run_all(decode, len(captures), jobs)
     if failed < len(captures):

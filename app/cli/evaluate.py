@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from app.cli.common import Verbs, add_verb, check_json_target, labelled, open_and_warn, scenes_in, write_json
 from app.progress import Progress
-from lfcore.errors import LfviewError
+from lfcore.distinct import unused
+from lfcore.errors import LfviewError, is_out_of_memory
 
 if TYPE_CHECKING:
     from lfcore.evaluation import Evaluation, SceneResult, SceneScore
@@ -164,10 +165,18 @@ def _score_all(
             try:
                 _score_scene(path, models, protocol, options, bar, found)
             except LfviewError as error:
-                found.failures.append(str(error))
-            except MemoryError:
+                found.failures.append(_named(path, str(error)))
+            except Exception as error:
+                if not is_out_of_memory(error):
+                    raise
                 found.failures.append(f"{path}: there is not enough memory for it; use smaller views or close other programs.")
     return found
+
+
+def _named(path: Path, sentence: str) -> str:
+    """The sentence, with the light field that it is about where it does not say so."""
+    names = (str(path), f"{path.name}:", f"{path.stem}:")
+    return sentence if any(name in sentence for name in names) else f"{path}: {sentence}"
 
 
 def _score_scene(
@@ -204,14 +213,5 @@ def _write_figures(
 
     for label, result in results.items():
         stem = light_field.name if len(results) == 1 else f"{light_field.name} {label}"
-        write_picture(make_folder(folder) / f"{_unused(stem, taken)}.png", scene_figure(result, protocol))
-
-
-def _unused(stem: str, taken: set[str]) -> str:
-    """The stem, numbered where two scenes share it; remembered in `taken`."""
-    safe = stem.replace("/", "_").replace("\\", "_")
-    name, number = safe, 2
-    while name in taken:
-        name, number = f"{safe} ({number})", number + 1
-    taken.add(name)
-    return name
+        name = unused(stem.replace("/", "_").replace("\\", "_"), taken)
+        write_picture(make_folder(folder) / f"{name}.png", scene_figure(result, protocol))

@@ -7,12 +7,15 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb, count
+from app.cli.common import Verbs, add_verb, at_most, count, whole
 from app.progress import Progress
 from lfcore.errors import InputError
 
 if TYPE_CHECKING:
     from lfcore.training.generated import GeneratedScene
+
+_MOST_SCENES = 100_000
+_MOST_WORKERS = 1024
 
 
 def add_parser(verbs: Verbs[Any], name: str) -> None:
@@ -23,9 +26,11 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         "write generated light fields with their true disparity",
         "lfview generate --count 12 --seed 1 --textures photographs/ --out scenes/",
     )
-    parser.add_argument("--count", type=count, default=1, metavar="N", help="how many scenes (default: 1)")
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="number of the first scene; the same number gives the same scene (0)"
+        "--count", type=at_most(_MOST_SCENES, count), default=1, metavar="N", help="how many scenes (default: 1)"
+    )
+    parser.add_argument(
+        "--seed", type=whole, default=0, metavar="S", help="number of the first scene; the same number gives the same scene (0)"
     )
     parser.add_argument(
         "--textures", type=Path, metavar="DIR", help="photographs that surfaces are covered with (default: patterns only)"
@@ -33,7 +38,9 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="one folder per scene is made in this folder")
     parser.add_argument("--views", type=count, default=5, metavar="N", help="N x N views (default: 5)")
     parser.add_argument("--size", type=count, default=352, metavar="PX", help="height and width of a view (default: 352)")
-    parser.add_argument("--workers", type=count, default=1, metavar="N", help="processes that generate (default: 1)")
+    parser.add_argument(
+        "--workers", type=at_most(_MOST_WORKERS, count), default=1, metavar="N", help="processes that generate (default: 1)"
+    )
     parser.set_defaults(run=run)
 
 
@@ -77,10 +84,10 @@ def _name(seed: int) -> str:
 
 def _check_free(out: Path, seed: int, scenes: int) -> None:
     """Scenes are not mixed with what is there already. Raises InputError."""
-    for k in range(scenes):
-        folder = out / _name(seed + k)
-        if folder.exists():
-            raise InputError(f"{folder} is there already; take it away, or choose another --seed or --out.")
+    there = {entry.name for entry in out.iterdir()} if out.is_dir() else set()
+    taken = next((name for name in map(_name, range(seed, seed + scenes)) if name in there), None)
+    if taken is not None:
+        raise InputError(f"{out / taken} is there already; take it away, or choose another --seed or --out.")
 
 
 def _write(scene: GeneratedScene, folder: Path) -> None:

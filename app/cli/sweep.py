@@ -9,7 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_light_field, add_model, add_verb, count_or_none, open_and_warn, positive, viewpoint
+from app.cli.common import (
+    Verbs,
+    add_light_field,
+    add_model,
+    add_verb,
+    check_apart_from,
+    count_or_none,
+    open_and_warn,
+    positive,
+    viewpoint,
+    whole,
+)
 from app.progress import Progress
 from lfcore.errors import InputError
 
@@ -42,7 +53,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
         metavar="NAME",
         help=f"{', '.join(PATH_NAMES)}, {_LINE}, or a .json file from the window or --save-path (default: {_DEFAULT_PATH})",
     )
-    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: 60)")
+    parser.add_argument("--frames", type=whole, metavar="N", help="number of frames (default: 60)")
     parser.add_argument("--fps", type=float, metavar="F", help="frames per second (default: 30)")
     parser.add_argument(
         "--radius",
@@ -107,6 +118,7 @@ def run(options: argparse.Namespace) -> int:
     check_target(plan, target)
     if options.save_path:
         check_file(options.save_path, (".json",))
+    check_apart_from(options.path, [target.path, options.save_path])
 
     from lfcore.sweep_frames import SweepFrames, remembering
     from lfcore.synthesizer import make_synthesizer

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_light_field, add_model, add_verb, count, open_and_warn, viewpoint
+from app.cli.common import Verbs, add_light_field, add_model, add_verb, check_apart_from, count, open_and_warn, viewpoint
 from app.progress import Progress
 from lfcore.errors import InputError
 
@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _one_view(options: argparse.Namespace) -> int:
-    from lfcore.export import IMAGE_EXTENSIONS, check_folder_target, check_target
+    from lfcore.export import IMAGE_EXTENSIONS, check_folder_target, check_target, warped_paths
     from lfcore.lightfield import check_viewpoint, is_extrapolated
 
     u, v = options.uv
@@ -98,6 +98,8 @@ def _one_view(options: argparse.Namespace) -> int:
         check_target(options.disparity, (".exr", ".tif", ".tiff", ".png"))
     if options.warped:
         check_folder_target(options.warped)
+    warped = [options.warped, *warped_paths(options.warped, out.suffix)] if options.warped else []
+    check_apart_from(options.path, [out, options.disparity, *warped])
 
     from lfcore.synthesizer import make_synthesizer
 
@@ -116,6 +118,7 @@ def _one_view(options: argparse.Namespace) -> int:
 def _grid(options: argparse.Namespace) -> int:
     from lfcore.synthesized_grid import check_grid_target, write_eslf, write_views
 
+    check_apart_from(options.path, [options.out])
     synthesizer, light_field = _opened(options)
     side = options.grid
     out = check_grid_target(options.out, side, light_field)
@@ -140,6 +143,7 @@ def _quilt(options: argparse.Namespace) -> int:
     quilt = Quilt(columns, rows, focus=options.focus or 0.0)
     synthesizer, light_field = _opened(options)
     out = check_quilt_target(options.out, quilt, light_field)
+    check_apart_from(options.path, [out])
     seconds = _timed(lambda done: write_quilt(out, quilt, light_field, _views(synthesizer), done), columns * rows)
     print(f"{out}: a quilt of {columns} x {rows} views of {light_field.name} by {synthesizer.name}, {seconds:.1f} s")
     return 0

@@ -14,7 +14,18 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import Verbs, add_verb, check_all_there, count, count_or_none, open_and_warn, positive, scenes_in, share
+from app.cli.common import (
+    Verbs,
+    add_verb,
+    at_most,
+    check_all_there,
+    count,
+    count_or_none,
+    open_and_warn,
+    positive,
+    scenes_in,
+    share,
+)
 from app.progress import Progress as Bar
 from app.progress import bar, clock
 from lfcore.errors import InputError
@@ -24,6 +35,7 @@ if TYPE_CHECKING:
     from lfcore.training.loop import Progress, TrainConfig
     from lfcore.training.patches import TrainingScene
 
+_MOST_PATCHES, _MOST_GENERATED = 10_000, 100_000
 _MOST_THREADS = 1024  # thousands of them end the program from within torch
 _FIRST_SCENE = 1000  # seed of the first generated scene: the same pool for every run
 _LINE_SECONDS = 60.0  # between two lines where the output is no terminal
@@ -64,7 +76,9 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--minutes", type=positive, metavar="M", default=math.inf, help="stop after so long (default: never)")
     parser.add_argument("--steps", type=count, metavar="N", default=20000, help="steps of the whole schedule (default: 20000)")
     parser.add_argument("--patch", type=count, metavar="PX", default=60, help="side of a training patch (default: 60)")
-    parser.add_argument("--batch", type=count, metavar="N", default=20, help="patches a step (default: 20)")
+    parser.add_argument(
+        "--batch", type=at_most(_MOST_PATCHES, count), metavar="N", default=20, help="patches a step (default: 20)"
+    )
     parser.add_argument(
         "--group", type=count, metavar="N", default=4, help="patches that share a viewpoint and its sweep; divides --batch (4)"
     )
@@ -93,7 +107,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
     parser.add_argument("--tones", type=share, metavar="F", default=0.5, help="share of patches whose tone is changed (0.5)")
     parser.add_argument(
         "--generated",
-        type=count_or_none,
+        type=at_most(_MOST_GENERATED, count_or_none),
         metavar="N",
         default=0,
         help="generated scenes to train on beside the data (0)",
@@ -126,7 +140,7 @@ def add_parser(verbs: Verbs[Any], name: str) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Train; Ctrl-C or SIGTERM ends the step, saves a checkpoint and leaves."""
-    from lfcore.export import check_folder_target, check_target
+    from lfcore.export import check_apart, check_folder_target, check_target
 
     out = check_target(options.out, (".safetensors",))
     run_dir = check_folder_target(options.run_dir or out.with_suffix(""))
@@ -136,13 +150,16 @@ def run(options: argparse.Namespace) -> int:
     import torch
 
     from lfcore.export import make_folder
-    from lfcore.training.loop import Runtime, train
+    from lfcore.training.checkpoint import CHECKPOINT
+    from lfcore.training.loop import Runtime, device_of, train
     from lfcore.training.team import join_team
     from lfcore.weights import load_weights
 
     config = _config(options)
-    if options.device == "cuda" and not torch.cuda.is_available():
-        raise InputError("There is no CUDA device that torch can use here; train with --device cpu or auto.")
+    # The same command could not go on from weights that it has overwritten.
+    read = [*options.data, *options.val, *(path for path in (options.init, options.teacher) if path)]
+    check_apart([out, run_dir, run_dir / CHECKPOINT], read)
+    device_of(options.device)  # refuses one that is not there now, not after scenes have been generated
     if options.threads and options.threads > _MOST_THREADS:
         raise InputError(
             f"{options.threads} threads were asked for; give at most {_MOST_THREADS}, better as many as there are cores."
@@ -180,7 +197,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> TrainConfig:
-    from lfcore.training.loop import TrainConfig
+    from lfcore.training.loop import TrainConfig, check_patches
     from lfcore.training.loss import LossConfig
     from lfcore.training.patches import PatchConfig
 
@@ -189,7 +206,7 @@ def _config(options: argparse.Namespace) -> TrainConfig:
     except ValueError as error:
         asked = f"--patch {options.patch} --batch {options.batch} --group {options.group}"
         raise InputError(f"{asked} will not do: {error}.") from error
-    return TrainConfig(
+    config = TrainConfig(
         steps=options.steps,
         learning_rate=options.lr,
         decay_share=options.decay,
@@ -201,6 +218,8 @@ def _config(options: argparse.Namespace) -> TrainConfig:
         model=options.model,
         revival_steps=options.revival,
     )
+    check_patches(config, options.teacher is not None)
+    return config
 
 
 def _generated(options: argparse.Namespace) -> list[TrainingScene]:

@@ -25,7 +25,7 @@ def write_eslf(path: Path, light_field: LightField) -> list[Path]:
     rows, columns, height, width, _ = light_field.views.shape
     blocks = light_field.views.transpose(2, 0, 3, 1, 4)  # (H, V, W, U, 3)
     write_stored(path, np.ascontiguousarray(blocks).reshape(rows * height, columns * width, 3))
-    return [path, _write_facts(path.with_suffix(".json"), light_field)]
+    return [path, _write_facts(facts_path(path, True), light_field)]
 
 
 def write_views(folder: Path, light_field: LightField) -> list[Path]:
@@ -40,7 +40,12 @@ def write_views(folder: Path, light_field: LightField) -> list[Path]:
             for column in range(light_field.columns):
                 written.append(folder / f"view_{row:02}_{column:02}.png")
                 write_stored(written[-1], light_field.views[row, column])
-        return [folder, _write_facts(folder.with_name(f"{folder.name}.json"), light_field)]
+        return [folder, _write_facts(facts_path(folder, False), light_field)]
+
+
+def facts_path(target: Path, is_eslf: bool) -> Path:
+    """The JSON beside an ESLF, or beside a folder of views."""
+    return target.with_suffix(".json") if is_eslf else target.with_name(f"{target.name}.json")
 
 
 def _write_facts(path: Path, light_field: LightField) -> Path:

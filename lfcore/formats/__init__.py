@@ -12,13 +12,13 @@ import numpy as np
 from lfcore.errors import InputError
 from lfcore.formats import array_files, arrays, eslf, views_folder
 from lfcore.formats.describe import describe
-from lfcore.formats.images import check_memory, read_header
+from lfcore.formats.images import EXTENSIONS, check_memory, read_header
 from lfcore.formats.lytro.container import is_container, open_container
 from lfcore.formats.lytro.contents import Kind, read_contents
 from lfcore.formats.lytro.extras import describe as describe_container
 from lfcore.lightfield import LightField
 
-__all__ = ["coarse_light_field", "describe", "open_light_field"]
+__all__ = ["coarse_light_field", "describe", "files_of", "open_light_field"]
 
 _VIEWS = 8  # side of the middle square of views, as in the paper
 
@@ -64,6 +64,22 @@ def open_light_field(
         f"{path} is a picture of {header.size} px, which is neither whole 14 x 14 px microlenses nor one view among "
         f"others in its folder; expected {_KINDS}."
     )
+
+
+def files_of(path: str | os.PathLike[str]) -> list[Path]:
+    """The files that a light field is read from: the views of a folder, or of that around a view, else the file itself.
+
+    Empty where nothing can be read, which opening it says in a sentence.
+    """
+    path = Path(path)
+    if not path.exists():
+        return []
+    try:
+        one_picture = path.suffix.lower() in EXTENSIONS and path.is_file() and eslf.has_camera_size(read_header(path))
+        views = [] if one_picture or not views_folder.sniff(path) else list(views_folder.grid_of(path).files.values())
+    except (InputError, OSError):
+        views = []
+    return views if path.is_dir() else [path, *views]
 
 
 def coarse_light_field(path: str | os.PathLike[str]) -> LightField | None:

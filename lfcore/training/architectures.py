@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.compact import CompactModel, initialise_compact
+from lfcore.compact import ALIGNMENT, CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
@@ -66,10 +66,12 @@ class Prediction:
 
 
 class Architecture(Protocol):
-    """One model's part in training."""
+    """One model's part in training. `alignment`: the side of a patch must be a multiple of so many px."""
 
-    def levels(self) -> Levels | None:
-        """The disparities that the model can name; None where it has none."""
+    alignment: int
+
+    def levels(self, model: Model) -> Levels | None:
+        """The disparities that a model can name; None where it has none."""
 
     def start(self, seed: int) -> Model:
         """A model with random weights."""
@@ -87,9 +89,12 @@ class Architecture(Protocol):
 class PaperPair:
     """The paper's two networks."""
 
-    def levels(self) -> Levels:
+    alignment = 1
+
+    def levels(self, model: Model) -> Levels:
         """See Architecture."""
-        return Levels()
+        assert isinstance(model, FullModel)
+        return model.config.levels
 
     def start(self, seed: int) -> Model:
         """See Architecture."""
@@ -137,10 +142,12 @@ class CompactPair:
     """The small pair. Its convolutions fill up with zeros at the edge of a patch, so a rim of the picture is not scored."""
 
     RIM = 8
+    alignment = ALIGNMENT
 
-    def levels(self) -> Levels:
+    def levels(self, model: Model) -> Levels:
         """See Architecture."""
-        return CompactModel().config.levels
+        assert isinstance(model, CompactModel)
+        return model.config.levels
 
     def start(self, seed: int) -> Model:
         """See Architecture."""
@@ -181,7 +188,9 @@ class CompactPair:
 class SingleNetwork:
     """The paper's ablation."""
 
-    def levels(self) -> None:
+    alignment = 1
+
+    def levels(self, model: Model) -> None:
         """See Architecture."""
         return
 

@@ -22,19 +22,20 @@ from torch import nn
 
 from lfcore.allocator import keep_freed_memory
 from lfcore.compact import CompactModel
+from lfcore.disparity_sign import baselines_differ, check_disparity
 from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.lightfield import LightField
-from lfcore.metrics import k16, k16_view
+from lfcore.metrics import check_size, k16, k16_view
 from lfcore.models import Model
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
 from lfcore.training.architectures import Batch, architecture
-from lfcore.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from lfcore.training.checkpoint import CHECKPOINT, Checkpoint, load_checkpoint, save_checkpoint
 from lfcore.training.clearing import clear
-from lfcore.training.curve import CurvePoint, write_curve
+from lfcore.training.curve import CurvePoint, column_names, write_curve
 from lfcore.training.loss import LossConfig, StepLoss
-from lfcore.training.optimiser import MuonAdam
+from lfcore.training.optimiser import MuonAdam, moment_shapes
 from lfcore.training.patches import PatchConfig, PatchGroup, TrainingScene, check_room, mixed, sample_group
 from lfcore.training.plot import plot
 from lfcore.training.revival import Part, Surroundings, revive
@@ -47,6 +48,7 @@ from lfcore.weights import Weights, save_weights
 # steps.
 _LOOKED_AT = 24
 _APART = 1000
+_TEACHER = "realtime"
 
 
 @dataclass(frozen=True)
@@ -90,12 +92,17 @@ class Progress:
 
 
 def prepare_scene(light_field: LightField) -> TrainingScene:
-    """Find the range of disparities of a scene by a plane sweep over its corners, so that shears keep it within the levels."""
-    side = min(light_field.rows, light_field.columns)
+    """Find the range of disparities of a scene by a plane sweep over its corners, so that shears keep it within the levels.
+
+    Raises InputError where there are too few views that lie equally far apart along rows and columns.
+    """
+    field = _evenly_spaced(light_field)
+    side = min(field.rows, field.columns)
     if side < 3:
-        grid = f"{light_field.rows} x {light_field.columns}"
-        raise InputError(f"{light_field.name} has {grid} views; training needs 3 x 3 or more.")
-    square = LightField(light_field.views[:side, :side], light_field.name, light_field.source, light_field.kind)
+        grid, even = f"{light_field.rows} x {light_field.columns}", f"{field.rows} x {field.columns}"
+        which = "" if even == grid else f", of which {even} lie equally far apart along rows and columns"
+        raise InputError(f"{light_field.name} has {grid} views{which}; training needs 3 x 3 or more.")
+    square = LightField(field.views[:side, :side], field.name, field.source, field.kind)
     levels = Levels()
     luma = luminance(corner_tensor(square)).unsqueeze(1)  # (4, 1, H, W)
     window = Window(0, square.height, 0, square.width)
@@ -107,7 +114,21 @@ def prepare_scene(light_field: LightField) -> TrainingScene:
     clear = (cost < F.avg_pool2d(deviation.mean(0)[None], 9, 4)[0] * 0.5) & (texture > texture.median())
     found = levels.values()[best[clear]] if int(clear.sum()) > 50 else levels.values()[best.flatten()]
     low, high = np.percentile(found.numpy(), (1, 99))
-    return TrainingScene(square, float(low), float(high))
+    return TrainingScene(field, float(low), float(high))
+
+
+def _evenly_spaced(light_field: LightField) -> LightField:
+    """The views that lie equally far apart along rows and columns, which patches are taken of: all of a square grid.
+
+    Along both sides of another grid there is one disparity, so its neighbours lie farther apart along the side with fewer
+    views, and of the other so many are left out; unless the pictures tell that all lie equally far apart.
+    """
+    rows, columns = light_field.rows, light_field.columns
+    if rows == columns or baselines_differ(light_field, check_disparity(light_field)):
+        return light_field
+    parts = math.gcd(rows - 1, columns - 1)
+    views = light_field.views[:: (rows - 1) // parts, :: (columns - 1) // parts]
+    return LightField(views, light_field.name, light_field.source, light_field.kind)
 
 
 def train(
@@ -127,17 +148,19 @@ def train(
     """Train from `initial` or anew until `config.steps`, `runtime.stop_after_minutes` or `stopped()`; if `run_dir` holds a
     checkpoint, go on from there.
 
-    Writes `out` (the averaged weights that scored best on `validation`, or the newest where there is none), and in `run_dir`
-    checkpoint.safetensors, curve.csv and curve.png. With a `team` of several processes each takes its share of every batch,
-    and the first alone validates, writes and reports; all must see the same `run_dir`. `generated` scenes, whose range of
-    disparities is known, are drawn for `config.generated_share` of the patches. A `teacher` guides the disparity. Raises
-    InputError for scenes too small and for a checkpoint of another configuration.
+    Writes `out` (the averaged weights that scored best on `validation`, or the newest where there is none, or no file), and in
+    `run_dir` checkpoint.safetensors, curve.csv and curve.png. With a `team` of several processes each takes its share of every
+    batch, and the first alone validates, writes and reports; all must see the same `run_dir`. `generated` scenes, whose range
+    of disparities is known, are drawn for `config.generated_share` of the patches. A `teacher` guides the disparity. A run that
+    has ended already writes `out` where it is missing, and does nothing else. Raises InputError for scenes too small and for a
+    checkpoint of another configuration.
     """
     keep_freed_memory()
-    for light_field in validation:
-        k16_view(light_field)  # refuses corners alone now, not after the first minutes
+    for light_field in validation:  # what cannot be scored is refused now, not after the first minutes
+        k16_view(light_field)
+        check_size(light_field, "K16")
     config = _settled(config, initial, teacher, team)
-    trainer = Trainer(config, _device(runtime.device), run_dir, initial.model if initial else None, team, teacher)
+    trainer = Trainer(config, device_of(runtime.device), run_dir, initial.model if initial else None, team, teacher)
     prepared = [prepare_scene(scene) for scene in scenes]
     check_room([*prepared, *generated], config.patches, trainer.levels)
     prepared = mixed(prepared, generated, config.generated_share)
@@ -157,6 +180,7 @@ def train(
             ending = trainer.step == config.steps or team.any(out_of_time or stopped())
             point = None
             if team.leads and (ending or now - last_validation > 60 * runtime.validate_minutes):
+                trainer.save_checkpoint()  # whatever may stop the validation
                 point = trainer.validate(validation, running)
                 trainer.save(out, scenes, prepared, len(generated), validation)
                 last_validation = time.monotonic()
@@ -164,17 +188,34 @@ def train(
             if team.leads:
                 report(Progress(trainer.step, config.steps, running, rate, point, revived))
             if ending:
-                team.wait()  # until the weights are written
-                return
+                break
+    if team.leads and trainer.owes(out):
+        point = trainer.validate(validation, trainer.last_loss)
+        trainer.save(out, scenes, prepared, len(generated), validation)
+        report(Progress(trainer.step, config.steps, point.loss, 0.0, point, 0))
+    team.wait()  # until the weights are written
+
+
+def check_patches(config: TrainConfig, taught: bool) -> None:
+    """Raise InputError where the model, or a teacher of it, cannot be given patches of this size."""
+    names = (config.model, _TEACHER) if taught else (config.model,)
+    multiple = math.lcm(*(architecture(name).alignment for name in names))
+    size = config.patches.size
+    if size % multiple:
+        raise InputError(
+            f"Patches of {size} px were asked for, but {names[-1]} takes multiples of {multiple} px; choose "
+            f"{size - size % multiple} or {size - size % multiple + multiple}."
+        )
 
 
 def _settled(config: TrainConfig, initial: Weights | None, teacher: Weights | None, team: Team) -> TrainConfig:
     """The config with what the other arguments decide. Raises InputError where they do not fit together."""
+    check_patches(config, teacher is not None)
     groups = config.patches.batch // config.patches.group
     if groups % team.size:
         raise InputError(f"{groups} groups of patches a step cannot be shared by {team.size} processes; change the batch.")
     if teacher is not None and not isinstance(teacher.model, CompactModel):
-        raise InputError(f"The teacher's weights are those of {teacher.model.config.name}; only realtime can teach.")
+        raise InputError(f"The teacher's weights are those of {teacher.model.config.name}; only {_TEACHER} can teach.")
     config = replace(config, teacher=teacher.digest if teacher else "")
     if initial is None:
         return config
@@ -200,9 +241,8 @@ class Trainer:
         self._run_dir = run_dir
         self._team = team
         self._architecture = architecture(config.model)
-        self._model = self._architecture.start(config.seed)
-        if initial is not None:
-            self._model.load_state_dict(initial.state_dict())
+        # Given weights keep their own config, which may be another than that of new ones.
+        self._model = self._architecture.start(config.seed) if initial is None else copy.deepcopy(initial)
         # What is idle in given weights stays so, if nothing revives it.
         self._trimmed = trim(self._model) if initial is not None and config.revival_steps <= 0 else None
         self._architecture.prepare(self._model)
@@ -211,24 +251,26 @@ class Trainer:
         self._optimiser = MuonAdam(self._model.parameters(), config.learning_rate)
         bfloat16 = device.type == "cuda" or machine_tuning().dtype == torch.bfloat16
         guide = teacher.model.eval().to(device) if teacher and isinstance(teacher.model, CompactModel) else None
-        self._loss = team.share(StepLoss(self._model, self._architecture, config.loss, bfloat16, guide))
+        self._loss = team.share(StepLoss(self._model, self._architecture, config.loss, bfloat16, guide, team))
         self._curve: list[CurvePoint] = []
         self._seconds = 0.0
         self._resumed = time.monotonic()
         self.step = 0
         run_dir.mkdir(parents=True, exist_ok=True)
-        checkpoint = load_checkpoint(self._checkpoint_path, asdict(config))
+        shapes = {name: tuple(value.shape) for name, value in self._model.state_dict().items()}
+        moments = [moment_shapes(parameter) for parameter in self._model.parameters()]
+        checkpoint = load_checkpoint(self._checkpoint_path, asdict(config), shapes, moments)
         if checkpoint is not None:
             self._restore(checkpoint)
 
     @property
     def _checkpoint_path(self) -> Path:
-        return self._run_dir / "checkpoint.safetensors"
+        return self._run_dir / CHECKPOINT
 
     def draw(self, scenes: Sequence[TrainingScene], step: int) -> list[PatchGroup]:
         """This process's share of the patches of one step, by the seed and the step's number alone."""
         patches = self._config.patches
-        mine = range(self._team.rank, patches.batch // patches.group, self._team.size)
+        mine = self._team.numbers(patches.batch // patches.group)
         generators = [np.random.default_rng((self._config.seed, step, index)) for index in mine]
         return [sample_group(scenes, patches, self.levels, rng) for rng in generators]
 
@@ -270,7 +312,16 @@ class Trainer:
     @property
     def levels(self) -> Levels:
         """The disparities within which patches are sheared."""
-        return self._architecture.levels() or Levels()
+        return self._architecture.levels(self._model) or Levels()
+
+    @property
+    def last_loss(self) -> float:
+        """That of the last validation; nan where there was none."""
+        return self._curve[-1].loss if self._curve else math.nan
+
+    def owes(self, out: Path) -> bool:
+        """Whether the weights of this step have not been validated, or there are none at `out`."""
+        return self.step > 0 and not (out.exists() and self._curve and self._curve[-1].step == self.step)
 
     def take_step(self, groups: Sequence[PatchGroup]) -> float:
         """One step of the optimiser; returns the mean squared error over RGB."""
@@ -296,13 +347,13 @@ class Trainer:
         """K16 of the averaged weights on each held-out light field, by the synthesizer that users get."""
         synthesizer = synthesizer_of(self._plain(), "validation")
         scores: dict[str, float] = {}
-        for light_field in light_fields:
+        for name, light_field in zip(column_names([each.name for each in light_fields]), light_fields, strict=True):
             row, column = k16_view(light_field)
             synthesizer.set_light_field(light_field)
             synthesis = synthesizer.synthesize(*light_field.position(row, column))
-            scores[light_field.name] = k16(synthesis.image, light_field.view(row, column)).psnr
+            scores[name] = k16(synthesis.image, light_field.view(row, column)).psnr
         point = CurvePoint(self.step, self._elapsed(), learning_rate(self._config, self.step), loss, scores)
-        self._curve.append(point)
+        self._curve = [*(past for past in self._curve if past.step < self.step), point]
         return point
 
     def save(
@@ -313,9 +364,9 @@ class Trainer:
         generated: int,
         validation: Sequence[LightField],
     ) -> None:
-        """Checkpoint, curve, and the weights if they are the best so far."""
+        """Checkpoint, curve, and the weights if they are the best so far, or there are none."""
         best = max(self._curve, key=lambda point: point.mean)
-        if best is self._curve[-1] or not validation:
+        if best is self._curve[-1] or not validation or not out.exists():
             plain, idle = self._plain_and_cleared(prepared)
             training = {
                 "steps": self.step,
@@ -324,9 +375,17 @@ class Trainer:
                 "scenes": sorted({scene.name for scene in scenes}),
                 "generated_scenes": generated,
                 "idle_channels": idle,
-                "k16_psnr": {name: round(value, 3) for name, value in self._curve[-1].scores.items()},
+                "k16_psnr": {
+                    name: round(value, 3) if math.isfinite(value) else None for name, value in self._curve[-1].scores.items()
+                },
             }
             save_weights(out, plain, training)
+        self.save_checkpoint()
+        write_curve(self._run_dir, self._curve)
+        write_picture(self._run_dir / "curve.png", plot(self._curve))
+
+    def save_checkpoint(self) -> None:
+        """What the run goes on from."""
         save_checkpoint(
             self._checkpoint_path,
             Checkpoint(
@@ -339,8 +398,6 @@ class Trainer:
             ),
             asdict(self._config),
         )
-        write_curve(self._run_dir, self._curve)
-        write_picture(self._run_dir / "curve.png", plot(self._curve))
 
     def _elapsed(self) -> float:
         return self._seconds + time.monotonic() - self._resumed
@@ -378,9 +435,10 @@ def learning_rate(config: TrainConfig, step: int) -> float:
     return config.learning_rate * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * min(falling, 1))))
 
 
-def _device(name: str) -> torch.device:
+def device_of(name: str) -> torch.device:
+    """Where to compute: cpu, cuda, or auto, which is cuda where there is one. Raises InputError where there is none."""
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("No CUDA device was found; use --device cpu.")
+        raise InputError("There is no CUDA device that torch can use here; train with --device cpu or auto.")
     return torch.device(name)

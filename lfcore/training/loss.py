@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -14,6 +15,8 @@ from lfcore.networks import BORDER
 from lfcore.planesweep import Levels, luminance, matching_disparity
 from lfcore.tone import root_tone
 from lfcore.training.architectures import Architecture, Batch, CompactPair, Prediction
+from lfcore.training.patches import PatchGroup
+from lfcore.training.team import ALONE, Team
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class StepLoss(nn.Module):
         config: LossConfig,
         bfloat16: bool,
         teacher: CompactModel | None = None,
+        team: Team = ALONE,
     ) -> None:
         super().__init__()
         self.model = model
@@ -43,6 +47,7 @@ class StepLoss(nn.Module):
         self._config = config
         self._bfloat16 = bfloat16
         self._teacher = [teacher] if teacher else []  # in a list, so that it is no part of what is trained
+        self._team = team
 
     def forward(self, batch: Batch, step: int) -> tuple[Tensor, Tensor]:
         """(mean squared error over RGB, loss), both scalars."""
@@ -52,12 +57,24 @@ class StepLoss(nn.Module):
         errors = (prediction.image - inner).square().mean((1, 2, 3))  # (B,)
         # Dark and flat patches have small errors; balanced, they teach as much as bright ones.
         loss = (errors / (inner.var((1, 2, 3)) + 0.005) ** self._config.balance).mean()
-        fading = 1 - step / max(self._config.matching_steps, 1)
-        if fading > 0 and prediction.disparity is not None:
-            loss = loss + self._config.matching_weight * fading * _matching_loss(batch, prediction)
+        if step < self._config.matching_steps and prediction.disparity is not None:
+            fading = 1 - step / self._config.matching_steps
+            loss = loss + self._config.matching_weight * fading * self._matching_loss(batch, prediction)
         if self._teacher and prediction.disparity is not None:
             loss = loss + self._config.teacher_weight * self._teaching_loss(batch, prediction)
         return errors.detach().mean(), loss
+
+    def _matching_loss(self, batch: Batch, prediction: Prediction) -> Tensor:
+        """Distance of the disparity from the level at which the inputs match the novel view best, where that is clear, in the
+        first group of the whole team that has all samples: one a step is enough, and costs less than all."""
+        assert prediction.disparity is not None
+        numbers = self._team.numbers(len(batch.groups) * self._team.size)
+        whole = [index for index, group in enumerate(batch.groups) if _has_all_samples(group)]
+        first = self._team.least(numbers[whole[0]] if whole else math.inf)
+        if not whole or numbers[whole[0]] != first:
+            return 0 * prediction.disparity.sum()
+        # The mean of the gradients of all processes, of which this one alone has the term, shall be that of one process.
+        return self._team.size * _matching_error(batch, prediction, whole[0])
 
     def _teaching_loss(self, batch: Batch, prediction: Prediction) -> Tensor:
         """Distance of the disparity from that of a small model that has been trained already."""
@@ -71,23 +88,23 @@ class StepLoss(nn.Module):
         return torch.autocast(device.type, dtype=torch.bfloat16, enabled=self._bfloat16)
 
 
-def _matching_loss(batch: Batch, prediction: Prediction) -> Tensor:
-    """Distance of the disparity from the level at which the inputs match the novel view best, where that is clear."""
+def _has_all_samples(group: PatchGroup) -> bool:
+    """Whether the patches lie away from the edges of the picture, so that all samples of a sweep count."""
+    w, (height, width) = group.window, group.inputs.shape[-2:]
+    return min(w.top, w.left, height - w.bottom, width - w.right) >= BORDER
+
+
+def _matching_error(batch: Batch, prediction: Prediction, index: int) -> Tensor:
+    """Distance of the disparity of one group from that of the best match, weighted by how clear it is."""
     assert prediction.disparity is not None
-    border = prediction.disparity_border
-    targets, disparities = batch.targets.split(batch.sizes), prediction.disparity.split(batch.sizes)
-    for images, offsets, group, target, disparity in zip(
-        batch.inputs, batch.offsets, batch.groups, targets, disparities, strict=True
-    ):
-        w, (height, width) = group.window, images.shape[-2:]
-        if min(w.top, w.left, height - w.bottom, width - w.right) < BORDER:
-            continue  # at an edge of the picture not all samples count
-        luma, wanted = root_tone(luminance(images)), root_tone(luminance(target))
-        levels = Levels().moved(-group.shift)
-        found, confidence = (cut(part, border) for part in matching_disparity(luma, offsets, levels, w, wanted))
-        error = F.smooth_l1_loss(disparity, found + group.shift, reduction="none")
-        return (confidence * error).mean()  # one group a step is enough, and costs less than all
-    return 0 * prediction.disparity.sum()
+    group, border = batch.groups[index], prediction.disparity_border
+    target, disparity = (planes.split(batch.sizes)[index] for planes in (batch.targets, prediction.disparity))
+    luma, wanted = root_tone(luminance(batch.inputs[index])), root_tone(luminance(target))
+    levels = Levels().moved(-group.shift)
+    matches = matching_disparity(luma, batch.offsets[index], levels, group.window, wanted)
+    found, confidence = (cut(part, border) for part in matches)
+    error = F.smooth_l1_loss(disparity, found + group.shift, reduction="none")
+    return (confidence * error).mean()
 
 
 def cut(planes: Tensor, border: int) -> Tensor:

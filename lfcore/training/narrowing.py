@@ -26,10 +26,10 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfcore.errors import LfviewError
+from lfcore.export import check_target
 from lfcore.formats import open_light_field
 from lfcore.models import Model
 from lfcore.networks import FullModel, PaperStack
-from lfcore.planesweep import Levels
 from lfcore.training.architectures import Batch, architecture
 from lfcore.training.loop import prepare_scene
 from lfcore.training.patches import PatchConfig, sample_group
@@ -149,6 +149,7 @@ def narrowed_file(path: Path, out: Path, folders: list[Path]) -> int:
 
     Raises LfviewError for what cannot be read or written, and ValueError for another model's file.
     """
+    check_target(out, (".safetensors",))
     weights = load_weights(path)
     model = weights.model
     if not isinstance(model, FullModel):
@@ -158,7 +159,7 @@ def narrowed_file(path: Path, out: Path, folders: list[Path]) -> int:
 
     def show() -> None:
         for index in range(_GROUPS):
-            group = sample_group(scenes, patches, Levels(), np.random.default_rng((_SEED, index)))
+            group = sample_group(scenes, patches, model.config.levels, np.random.default_rng((_SEED, index)))
             paper.predict(model, Batch.of([group], torch.device("cpu")), lambda: torch.autocast("cpu", enabled=False))
 
     count = narrow(model, show)

@@ -34,6 +34,12 @@ def orthogonalised(matrix: Tensor) -> Tensor:
     return x.T if matrix.shape[0] > matrix.shape[1] else x
 
 
+def moment_shapes(parameter: Tensor) -> dict[str, tuple[int, ...]]:
+    """The shapes of what is kept of a parameter from step to step, by name."""
+    shape = tuple(parameter.shape)
+    return {"momentum": shape} if is_matrix(parameter) else {"step": (), "mean": shape, "square": shape}
+
+
 class MuonAdam(Optimizer):
     """Muon and Adam with one learning rate: Muon's steps are scaled to the size that Adam's have (Liu et al. 2025)."""
 

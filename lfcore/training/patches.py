@@ -1,10 +1,10 @@
 """Training patches: four corner views, a captured novel view between them, and every exact way of making more of them.
 
-From one light field come all square sub-grids, all their novel positions, flips and transposes (positions and pixels
-together), shears, and tones that are the same for all five views. A shear crops view (row, column) at a place that moves by
-m whole pixels per view: exact, and it adds the same number of pixels to every disparity. What lies between two such shears
-comes from a shift of the sweep: with all its levels s px lower, the networks see what they would see of a scene whose
-disparities are s px higher, and that is exact too, and free.
+From one light field, whose views lie equally far apart along rows and columns, come all square sub-grids, all their novel
+positions, flips and transposes (positions and pixels together), shears, and tones that are the same for all five views. A shear
+crops view (row, column) at a place that moves by m whole pixels per view: exact, and it adds the same number of pixels to every
+disparity. What lies between two such shears comes from a shift of the sweep: with all its levels s px lower, the networks see
+what they would see of a scene whose disparities are s px higher, and that is exact too, and free.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from lfcore.training.scenes.paleness import mixing, outwardness
 
 @dataclass(frozen=True)
 class PatchConfig:
-    """What a batch is made of. `size` is the side of a patch as the networks see it; 24 px less come out."""
+    """What a batch is made of. `size` is the side of a patch as the networks see it, px; less comes out, by model: of `full` 24
+    px less, of `single` 12, and of `realtime` 16 px less count."""
 
     size: int = 60
     batch: int = 20
@@ -43,7 +44,8 @@ class PatchConfig:
 
 @dataclass(frozen=True)
 class TrainingScene:
-    """A light field and the range of its disparities, px over its full corner-to-corner baseline."""
+    """A light field, whose views lie equally far apart along rows and columns, and the range of its disparities, px from corner
+    to corner of its largest square sub-grid."""
 
     light_field: LightField
     low: float

@@ -25,17 +25,25 @@ class Team:
         """Whether this process is the one that validates, writes and reports."""
         return self.rank == 0
 
+    def numbers(self, count: int) -> range:
+        """Which of `count` things, numbered over the whole team from 0, are this process's."""
+        return range(self.rank, count, self.size)
+
     def share(self, module: nn.Module) -> nn.Module:
         """The module, with gradients averaged over the team."""
         return module if self.size == 1 else DistributedDataParallel(module)
 
     def any(self, flag: bool) -> bool:
         """Whether the flag holds in any process; all must ask at the same step."""
+        return bool(-self.least(-float(flag)))
+
+    def least(self, number: float) -> float:
+        """The least of the numbers of all processes; all must ask at the same step."""
         if self.size == 1:
-            return flag
-        flags = torch.tensor(float(flag), device="cuda" if dist.get_backend() == "nccl" else "cpu")
-        dist.all_reduce(flags, dist.ReduceOp.MAX)
-        return bool(flags)
+            return number
+        numbers = torch.tensor(float(number), device="cuda" if dist.get_backend() == "nccl" else "cpu")
+        dist.all_reduce(numbers, dist.ReduceOp.MIN)
+        return float(numbers)
 
     def agree(self, tensor: Tensor) -> Tensor:
         """The first process's tensor, in all of them; all must ask at the same step."""

@@ -22,7 +22,8 @@ _LEVELS = 65536
 class CameraConfig:
     """Ranges from which the camera of a scene is drawn, each evenly unless said otherwise. Light is linear, 1 = white."""
 
-    misplacement: Range = (0.0, 0.2)  # px, deviation of each view's place; its square is drawn evenly spread to small values
+    # px, deviation of each view's place; what is drawn is made smaller by a share that is drawn too, so that most are small
+    misplacement: Range = (0.0, 0.2)
     wandering: Range = (0.0, 0.012)  # deviation of each view's (u, v), in baselines
     gain_deviation: Range = (0.0, 0.015)  # of the views' brightness, relative
     tint_deviation: Range = (0.0, 0.008)  # of the views' red, green and blue, relative
