@@ -31,7 +31,7 @@ from tests.lytro_files import SHARED, write_f01
 from tests.test_lytro_contents import write_stack
 from tests.test_panels import Screen
 
-PATIENCE = 10.0
+PATIENCE = 60.0
 FOCUS = (-8.0, -3.0, 1.0, 6.0)
 STACK = tuple(Caption("Refocus stack", 640, 480, focus) for focus in FOCUS)
 MAP = Caption("Depth", 88, 60, span=(-8.0, 6.0), unit="lambda")

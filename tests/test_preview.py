@@ -24,7 +24,7 @@ from tests.camera_truth import small, write_model_capture
 
 
 def _until(controller: Controller, condition: Callable[[], bool]) -> None:
-    deadline, now = time.monotonic() + 10, 0.0
+    deadline, now = time.monotonic() + 60, 0.0
     while not condition():
         assert time.monotonic() < deadline
         now += 0.01
@@ -40,7 +40,7 @@ def test_the_coarse_picture_gives_way_to_the_light_field() -> None:
     synthesizer, go = TruthSynthesizer(), threading.Event()
 
     def opened(*_: object) -> LightField:
-        go.wait(10)
+        go.wait(60)
         return light_field(3, 3)
 
     controller = _controller(synthesizer, opened)
