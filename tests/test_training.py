@@ -19,6 +19,7 @@ from lfcore.network_synthesizer import NetworkSynthesizer
 from lfcore.networks import BORDER, FullModel, initialise
 from lfcore.planesweep import Levels
 from lfcore.synthesizer import corner_offsets
+from lfcore.training import loop
 from lfcore.training.architectures import Batch, Prediction, architecture
 from lfcore.training.conditioning import mixing_matrix
 from lfcore.training.curve import CurvePoint, write_curve
@@ -33,6 +34,12 @@ from lfcore.weights import load_weights
 
 LEVELS = Levels()
 SMALL = PatchConfig(size=32, batch=2, group=2, tone_share=0.0)
+
+
+@pytest.fixture(autouse=True)
+def few_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run looks for dead and idle channels in fewer patches, for that would take longer than its few steps."""
+    monkeypatch.setattr(loop, "_LOOKED_AT", 4)
 
 
 def scene(disparity: float, grid: tuple[int, int] = (4, 4), size: tuple[int, int] = (130, 150)) -> TrainingScene:
@@ -59,21 +66,22 @@ def test_patches_agree_with_their_inputs_under_shear_symmetry_and_tone() -> None
     disparities = set()
     for step in range(12):
         group = sample_group(scenes, config, LEVELS, np.random.default_rng((1, step)))
-        inputs, target = torch.from_numpy(group.inputs), torch.from_numpy(group.target)
-        offsets = corner_offsets(group.u, group.v)
-        top, left = group.window.top, group.window.left
-        errors = {}
-        for candidate in np.arange(-21, 21.01, 0.25):
-            disparity = torch.full((1, 1, 32, 32), float(candidate))
-            warped = torch.cat([backward_warp(inputs[i, :1], disparity, offsets[i : i + 1], (top, left)) for i in range(4)])
-            seen = (warped != 0).all(1, keepdim=True)
-            if int(seen.sum()) > 1000:
-                errors[float(candidate)] = float(((warped - target[:1]).abs() * seen).sum() / (3 * seen.sum()))
-        best = min(errors, key=errors.__getitem__)
-        assert errors[best] < 0.01, step
+        near = min(range(-21, 22), key=lambda candidate: first_error(group, candidate))
+        around = [near + quarters / 4 for quarters in range(-3, 4) if abs(near + quarters / 4) <= 21]
+        best = min(around, key=lambda candidate: first_error(group, candidate))
+        assert first_error(group, best) < 0.01, step
         disparities.add(best)
     assert len(disparities) > 3  # shears widen what one plane teaches
     assert min(disparities) < 0 < max(disparities)
+
+
+def first_error(group: PatchGroup, disparity: float) -> float:
+    """Mean difference of the first patch's inputs, warped by one disparity, from the novel view, each where it has samples."""
+    inputs, target = torch.from_numpy(group.inputs[:, 0]), torch.from_numpy(group.target[0])
+    flat, place = torch.full((1, 1, 32, 32), float(disparity)), (group.window.top, group.window.left)
+    warped = backward_warp(inputs, flat, corner_offsets(group.u, group.v), place)
+    seen = (warped != 0).all(1, keepdim=True)
+    return float(((warped - target).abs() * seen).sum() / (3 * seen.sum())) if int(seen.sum()) > 1000 else math.inf
 
 
 def test_shears_and_shifts_together_leave_no_gap_among_the_disparities() -> None:
@@ -100,7 +108,7 @@ def plane_error(group: PatchGroup, disparity: float) -> float:
     inputs, target = torch.from_numpy(group.inputs[:, 0]), torch.from_numpy(group.target[0])
     w, offsets = group.window, corner_offsets(group.u, group.v)
     flat = torch.full((1, 1, w.bottom - w.top, w.right - w.left), disparity)
-    warped = torch.cat([backward_warp(inputs[i : i + 1], flat, offsets[i : i + 1], (w.top, w.left)) for i in range(4)])
+    warped = backward_warp(inputs, flat, offsets, (w.top, w.left))
     seen = (warped != 0).all(1, keepdim=True).all(0)
     return float(((warped - target).abs() * seen).sum() / (12 * seen.sum())) if int(seen.sum()) > 300 else math.inf
 
@@ -260,7 +268,8 @@ def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path, model: str) 
     assert straight.keys() == halved.keys()
 
 
-def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path) -> None:
+def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()  # the patches decide what is idle
     train_small(tmp_path, 1, "first")
     given = load_weights(tmp_path / "first.safetensors")
     config = TrainConfig(
