@@ -1,6 +1,9 @@
 import copy
+import functools
 import itertools
 import math
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -250,6 +253,19 @@ def train_small(tmp_path: Path, steps: int, run: str, stop_at: int | None = None
     return reports
 
 
+@pytest.fixture(scope="module")
+def one_step(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The folder of a run of one step, trained.safetensors and trained/, by the model; tests that only read it share it."""
+
+    @functools.cache
+    def folder(model: str) -> Path:
+        made = tmp_path_factory.mktemp(model)
+        train_small(made, 1, "trained", model=model)
+        return made
+
+    return folder
+
+
 @pytest.mark.parametrize("model", TRAINABLE)
 def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path, model: str) -> None:
     whole = train_small(tmp_path, 5, "straight", model=model)
@@ -268,10 +284,11 @@ def test_a_stopped_run_goes_on_exactly_where_it_was(tmp_path: Path, model: str) 
     assert straight.keys() == halved.keys()
 
 
-def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_goes_on_from_given_weights_and_names_them(
+    tmp_path: Path, one_step: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = load_weights(one_step("full") / "trained.safetensors")
     monkeypatch.undo()  # the patches decide what is idle
-    train_small(tmp_path, 1, "first")
-    given = load_weights(tmp_path / "first.safetensors")
     config = TrainConfig(
         steps=1, learning_rate=1e-9, warm_up_steps=0, loss=LossConfig(matching_steps=0), patches=SMALL, revival_steps=0
     )
@@ -295,18 +312,16 @@ def test_a_run_goes_on_from_given_weights_and_names_them(tmp_path: Path, monkeyp
         assert kept.float().mean() > 0.8
 
 
-def test_a_run_does_not_begin_with_the_weights_of_another_model(tmp_path: Path) -> None:
-    train_small(tmp_path, 1, "small", model="realtime")
-    given = load_weights(tmp_path / "small.safetensors")
+def test_a_run_does_not_begin_with_the_weights_of_another_model(tmp_path: Path, one_step: Callable[[str], Path]) -> None:
+    given = load_weights(one_step("realtime") / "trained.safetensors")
     scenes = [plane(2.0, (3, 3), (120, 120))]
     out, run = tmp_path / "o.safetensors", tmp_path / "r"
     with pytest.raises(InputError, match="of realtime, not of full"):
         train(TrainConfig(model="full", patches=SMALL), Runtime("cpu"), scenes, [], out, run, print, lambda: False, given)
 
 
-def test_a_teacher_adds_the_distance_to_its_disparity(tmp_path: Path) -> None:
-    train_small(tmp_path, 1, "teacher", model="realtime")
-    teacher = load_weights(tmp_path / "teacher.safetensors")
+def test_a_teacher_adds_the_distance_to_its_disparity(one_step: Callable[[str], Path]) -> None:
+    teacher = load_weights(one_step("realtime") / "trained.safetensors")
     assert isinstance(teacher.model, CompactModel)
     pair, model = architecture("full"), FullModel()
     initialise(model, 1)
@@ -357,9 +372,8 @@ def test_at_an_edge_of_the_picture_the_papers_pair_is_trained_on_what_it_is_used
     np.testing.assert_allclose(found.image[0].clamp(0, 1).permute(1, 2, 0), expected.image[inner], atol=1e-4)
 
 
-def test_only_the_small_pair_can_teach(tmp_path: Path) -> None:
-    train_small(tmp_path, 1, "full")
-    teacher, scenes = load_weights(tmp_path / "full.safetensors"), [plane(2.0, (3, 3), (120, 120))]
+def test_only_the_small_pair_can_teach(tmp_path: Path, one_step: Callable[[str], Path]) -> None:
+    teacher, scenes = load_weights(one_step("full") / "trained.safetensors"), [plane(2.0, (3, 3), (120, 120))]
     out, run = tmp_path / "o.safetensors", tmp_path / "r"
     with pytest.raises(InputError, match="only realtime can teach"):
         train(TrainConfig(steps=1, patches=SMALL), Runtime("cpu"), scenes, [], out, run, print, lambda: False, teacher=teacher)
@@ -371,8 +385,10 @@ def load_checkpoint_tensors(run: Path) -> dict[str, torch.Tensor]:
     return load_file(run / "checkpoint.safetensors")
 
 
-def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(tmp_path: Path) -> None:
-    train_small(tmp_path, 1, "run")
+def test_a_checkpoint_of_another_configuration_or_a_damaged_one_is_refused(
+    tmp_path: Path, one_step: Callable[[str], Path]
+) -> None:
+    shutil.copytree(one_step("full") / "trained", tmp_path / "run")
     config = TrainConfig(steps=2, decay_share=0, loss=LossConfig(matching_steps=3), patches=SMALL, learning_rate=5e-3)
     scenes = [plane(2.0, (3, 3), (120, 120))]
     arguments = (scenes, [], tmp_path / "o.safetensors", tmp_path / "run", lambda p: None, lambda: False)
@@ -389,7 +405,7 @@ def test_steps_on_the_same_patches_lower_their_error(tmp_path: Path, model: str)
     config = TrainConfig(model=model, learning_rate=3e-4, warm_up_steps=1, loss=LossConfig(matching_steps=0), patches=SMALL)
     trainer = Trainer(config, torch.device("cpu"), tmp_path)
     groups = trainer.draw([scene(5.0)], 0)
-    errors = [trainer.take_step(groups) for _ in range(30)]
+    errors = [trainer.take_step(groups) for _ in range(12)]
     assert errors[-1] < 0.5 * errors[0]
 
 
