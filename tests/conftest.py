@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import signal
+import tempfile
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import av  # noqa: F401  adds a logger; a thread of the program's would, at a moment when pytest walks through the loggers
@@ -15,11 +19,26 @@ from virtual_screen import VirtualScreen, require_tools, virtual_screen
 if TYPE_CHECKING:
     from app.offscreen import Offscreen
 
+# What the program keeps for its user, it keeps here; programs that the tests start inherit this.
+_KEPT = tempfile.mkdtemp(prefix="lfview-tests-")
+atexit.register(shutil.rmtree, _KEPT, ignore_errors=True)
+os.environ["LFVIEW_CACHE"] = str(Path(_KEPT) / "kept")
+os.environ["XDG_CACHE_HOME"] = str(Path(_KEPT) / "cache")
+os.environ["XDG_CONFIG_HOME"] = str(Path(_KEPT) / "config")
+
 # A software context, so that the tests see the same pictures on every machine.
 os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
 
 # Where the tests are a background job of a script, Ctrl-C is ignored, also by the programs that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def sigterm() -> Iterator[None]:
+    """What is done at SIGTERM stays as it was; main() changes it for good, since its process is the program's."""
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
 
 
 @pytest.fixture(scope="session")
@@ -56,15 +75,17 @@ def viewer(gl: Any) -> Iterator[Offscreen]:
 
     controller = Controller(Engine(lambda: TruthSynthesizer(), 2**24), lambda *_: light_field(2, 2), lambda: None, "truth")
     made = Offscreen(controller, gl, (1000, 700), 1.0)
-    controller.show_light_field(light_field(2, 2))
-    deadline = time.monotonic() + 60
-    while controller.step is not Step.FULL:
-        assert time.monotonic() < deadline
-        made.frame()
-    made.settled()
-    yield made
-    made.close()
-    controller.stop()
+    try:
+        controller.show_light_field(light_field(2, 2))
+        deadline = time.monotonic() + 60
+        while controller.step is not Step.FULL:
+            assert time.monotonic() < deadline
+            made.frame()
+        made.settled()
+        yield made
+    finally:  # else the next tests would find two of them
+        made.close()
+        controller.stop()
     assert gl.error == "GL_NO_ERROR"
 
 

@@ -49,8 +49,8 @@ class TruthSynthesizer:
         self._size = (light_field.height, light_field.width)
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = lambda: False) -> Synthesis:
-        self.asked.append((u, v))
         end = time.monotonic() + self.seconds
+        self.asked.append((u, v))  # from here on a test may choose how long the next one takes
         while time.monotonic() < end:
             if cancelled():
                 raise Cancelled

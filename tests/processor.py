@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
+import platform
+import sys
 from pathlib import Path
+
+_ARCH_PRCTL = 158  # of x86-64
+_REQUEST_PERMISSION = 0x1023  # ARCH_REQ_XCOMP_PERM, of Linux 5.16
+_TILE_DATA = 18
 
 
 def processor_flags() -> set[str]:
@@ -12,3 +19,10 @@ def processor_flags() -> set[str]:
     except OSError:
         return set()
     return next((set(line.split()) for line in lines if line.startswith("flags")), set())
+
+
+def tiles_are_granted() -> bool:
+    """Whether this system lets a program keep the matrix unit's tiles; a processor may have one whose system does not."""
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        return False
+    return ctypes.CDLL(None).syscall(_ARCH_PRCTL, _REQUEST_PERMISSION, _TILE_DATA) == 0

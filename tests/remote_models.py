@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def blend(corners: FloatArray, u: float, v: float) -> FloatArray:
 
 
 class Blender:
-    """Blends the corners. What else happens is told by its name."""
+    """Blends the corners. What else happens is told by its name; "patient" may say which file tells that a query has begun."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -38,7 +39,10 @@ class Blender:
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = lambda: False) -> Synthesis:
         assert self._corners is not None
-        if self.name == "patient":
+        if self.name.startswith("patient"):
+            began = self.name.partition(" ")[2]
+            if began:
+                Path(began).touch()
             end = time.monotonic() + PATIENT_SECONDS
             while time.monotonic() < end:
                 if cancelled():

@@ -30,7 +30,7 @@ Picture = npt.NDArray[np.uint8]
 FOLDER = Path(__file__).parent / "pictures"
 VIEW = (240, 320)  # (H, W)
 NOISE = 0.05  # of the synthesis, so that there is an error to see
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -310,7 +311,8 @@ def test_scenes_of_a_folder_and_labels_of_models(scene: Path, tmp_path: Path) ->
 def test_train_hands_its_options_to_the_loop(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from lfcore.training import loop
+    from lfcore.training import generated, loop
+    from lfcore.training.generated import GeneratedScene, SceneConfig, Textures
 
     seen: dict[str, object] = {}
 
@@ -340,7 +342,14 @@ def test_train_hands_its_options_to_the_loop(
         assert stopped()
         report(loop.Progress(2, 5, 0.125, 2.0, CurvePoint(2, 1.0, 1e-4, 0.125, {"held": 30.5}), 3))
 
+    make = generated.generate_pool
+
+    def small_pool(count: int, seed: int, textures: Textures, config: SceneConfig, *more: Any) -> Iterator[GeneratedScene]:
+        assert config == SceneConfig()
+        return make(count, seed, textures, SceneConfig(height=64, width=64), *more)
+
     monkeypatch.setattr(loop, "train", train)
+    monkeypatch.setattr(generated, "generate_pool", small_pool)
     out = tmp_path / "w.safetensors"
     options = [
         "--steps",

@@ -15,7 +15,7 @@ from app.dialogs import Answered, Purpose, Question
 pytestmark = pytest.mark.skipif(
     sys.platform in ("win32", "darwin"), reason="these systems' dialogs cannot be answered by a test"
 )
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 @pytest.fixture
@@ -68,10 +68,14 @@ def test_asking_does_not_wait(programs: Path, tmp_path: Path) -> None:
     assert dialog.poll() == Answered(Path("/a"))
 
 
-def test_giving_up_and_failing_to_appear_are_told_apart(programs: Path, tmp_path: Path) -> None:
+def test_giving_up_and_failing_to_appear_are_told_apart(
+    programs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     question = Question(Purpose.SAVE_FILE, "Save", tmp_path / "new.png")
-    install(programs, "zenity", "sleep 0.5\nexit 1")
+    monkeypatch.setattr(dialogs, "_TOO_SOON_SECONDS", 0.05)
+    install(programs, "zenity", "sleep 0.1\nexit 1")
     assert answer_of(question) == Answered(None, shown=True)
+    monkeypatch.setattr(dialogs, "_TOO_SOON_SECONDS", 30.0)
     install(programs, "zenity", "echo no display >&2\nexit 1")
     assert answer_of(question) == Answered(None, shown=False)
 

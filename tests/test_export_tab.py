@@ -142,10 +142,18 @@ def test_a_right_click_in_the_pad_adds_and_removes_key_frames(screen: Screen) ->
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_every_choice_is_drawn(screen: Screen, product: Product, shape: str, scale: float) -> None:
     export = screen.state.export
-    export.product, export.shape, export.refocus = product, shape, True
     screen.scale = scale
-    screen.frame(3)
-    assert export.shape == shape
+    has_focus = product in (Product.SWEEP, Product.QUILT)
+    for height in (800.0, 2000.0):  # some of the tab, and all of it at once
+        drawn = []
+        for refocus in (False, True):
+            export.product, export.shape, export.refocus = product, shape, refocus
+            screen.size = (1280.0, height)
+            screen.frame(3)
+            assert (export.product, export.shape, export.refocus) == (product, shape, refocus)
+            drawn.append(screen.drawn())
+        assert (drawn[0] != drawn[1]) == has_focus
+    assert not has_focus or len(drawn[1]) > len(drawn[0]) + 50 * 12  # not only a tick, but what is then asked for
 
 
 def status(phase: Phase, done: int = 0, seconds: float = 0.0, message: str = "") -> Status:

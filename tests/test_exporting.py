@@ -18,7 +18,7 @@ from lfcore.sweep_frames import SweepFrames
 from lfcore.sweep_plan import KeyFramePath, SweepPlan
 from lfcore.sweep_target import Kind, Target
 from tests.moving_scene import TruthSynthesizer, light_field, truth
-from tests.virtual_screen import wait_until
+from tests.virtual_screen import PATIENCE, wait_until
 
 PLAN = SweepPlan(KeyFramePath((Stop(0, 0.5), Stop(1, 0.5))), 6)
 
@@ -27,7 +27,7 @@ PLAN = SweepPlan(KeyFramePath((Stop(0, 0.5), Stop(1, 0.5))), 6)
 def queue() -> Iterator[ExportQueue]:
     made = ExportQueue(lambda: None)
     yield made
-    assert made.stop(10)
+    assert made.stop(PATIENCE)
 
 
 def job(write: Callable[[Done, Cancel], None], total: int = 3) -> Job:
@@ -35,7 +35,7 @@ def job(write: Callable[[Done, Cancel], None], total: int = 3) -> Job:
 
 
 def finish(queue: ExportQueue) -> tuple[Status, ...]:
-    wait_until(lambda: not queue.busy, "the queue", 30)
+    wait_until(lambda: not queue.busy, "the queue")
     return queue.statuses
 
 
@@ -67,10 +67,10 @@ def test_progress_tells_rate_and_time_left(queue: ExportQueue) -> None:
     def write(done: Done, cancelled: Cancel) -> None:
         time.sleep(0.1)
         done(2)
-        go_on.wait(10)
+        go_on.wait(PATIENCE)
 
     queue.add(job(write, total=10))
-    wait_until(lambda: queue.statuses[0].done == 2, "two pieces", 10)
+    wait_until(lambda: queue.statuses[0].done == 2, "two pieces")
     status = queue.statuses[0]
     assert status.phase is Phase.RUNNING
     assert status.rate is not None and status.rate <= 20
@@ -109,7 +109,7 @@ def test_what_waits_and_what_runs_can_be_cancelled(queue: ExportQueue) -> None:
         raise Cancelled
 
     first, second, third = (queue.add(job(write)) for write in (endless, endless, lambda done, cancelled: None))
-    wait_until(lambda: queue.statuses[0].phase is Phase.RUNNING, "the first", 10)
+    wait_until(lambda: queue.statuses[0].phase is Phase.RUNNING, "the first")
     queue.cancel(second)
     assert queue.statuses[1].phase is Phase.CANCELLED
     queue.clear()
@@ -132,8 +132,8 @@ def test_stopping_ends_what_runs() -> None:
 
     queue.add(job(endless))
     queue.add(job(endless))
-    assert started.wait(10)
-    assert queue.stop(10)
+    assert started.wait(PATIENCE)
+    assert queue.stop(PATIENCE)
 
 
 def source(synthesizer: TruthSynthesizer, hand_waits: Callable[[], bool] = lambda: False) -> Source:
@@ -154,14 +154,14 @@ def test_an_exported_sweep_is_that_of_the_library(queue: ExportQueue, tmp_path: 
     names = sorted(path.name for path in (tmp_path / "window").iterdir())
     assert len(names) == 6
     assert all((tmp_path / "window" / n).read_bytes() == (tmp_path / "library" / n).read_bytes() for n in names)
-    assert queue.stop(10)
+    assert queue.stop(PATIENCE)
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "frames"])
 def test_a_cancelled_sweep_leaves_nothing(queue: ExportQueue, tmp_path: Path, name: str) -> None:
     kind = Kind.VIDEO if name.endswith("mp4") else Kind.PNG
     number = queue.add(sweep_job(PLAN, Target(tmp_path / name, kind), source(TruthSynthesizer(0.2))))
-    wait_until(lambda: queue.statuses[0].done >= 1, "the first frame", 30)
+    wait_until(lambda: queue.statuses[0].done >= 1, "the first frame")
     queue.cancel(number)
     assert finish(queue)[0].phase is Phase.CANCELLED
     assert list(tmp_path.iterdir()) == []
@@ -179,23 +179,34 @@ def test_a_target_that_cannot_be_written_is_told_before_the_model_is_made(queue:
 
 
 def test_the_hand_comes_first() -> None:
-    hand = threading.Event()
-    synthesizer = TruthSynthesizer(0.3)
-    polite = Polite(synthesizer, hand.is_set, lambda: False)
+    hand, noticed = threading.Event(), threading.Event()
+
+    def hand_waits() -> bool:
+        waits = hand.is_set()
+        if waits:
+            noticed.set()
+        return waits
+
+    synthesizer = TruthSynthesizer(60.0)
+    polite = Polite(synthesizer, hand_waits, lambda: False)
     polite.set_light_field(light_field())
     results: list[np.ndarray] = []
     hand.set()
     thread = threading.Thread(target=lambda: results.append(polite.synthesize(0.5, 0.5).image))
     thread.start()
+    assert noticed.wait(PATIENCE)
     time.sleep(0.1)
     assert synthesizer.asked == []  # it waits
     hand.clear()
-    wait_until(lambda: len(synthesizer.asked) == 1, "the first attempt", 10)
+    wait_until(lambda: len(synthesizer.asked) == 1, "the first attempt")
+    synthesizer.seconds = 0.0  # of the next attempt
+    noticed.clear()
     hand.set()  # the hand moves: what was begun is given up, and begun again later
+    assert noticed.wait(PATIENCE)
     time.sleep(0.1)
-    assert results == []
+    assert results == [] and len(synthesizer.asked) == 1
     hand.clear()
-    thread.join(10)
+    thread.join(PATIENCE)
     assert len(synthesizer.asked) == 2
     assert np.array_equal(results[0], truth(0.5, 0.5))
 

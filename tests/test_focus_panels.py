@@ -217,11 +217,14 @@ def test_slices_and_stereo_draw_in_every_size(imgui_context: Any, size: tuple[in
     screen.readout = replace(OPEN, has_disparity=True, focus=FocusFacts(under=3.0))
     screen.size = size
     screen.state.focusing = replace(screen.state.focusing, slices=True, pin=(540.0, 375.0))
-    for look in (Look.SYNTHESIS, Look.REFOCUS, Look.ANAGLYPH, Look.STEREO_PARALLEL, Look.STEREO_CROSSED):
+    looks, drawn = (Look.SYNTHESIS, Look.REFOCUS, Look.ANAGLYPH, Look.STEREO_PARALLEL, Look.STEREO_CROSSED), set()
+    for look in looks:
         for tab in Tab:
             screen.state.look, screen.state.tab = look, tab
-            screen.frame(2)
+            screen.frame(3)
             assert screen.layout.picture.width > 0 and screen.layout.picture.height > 0
+            drawn.add(screen.drawn())
+    assert len(drawn) == len(looks) * (1 if screen.layout.panel is None else len(Tab))
 
 
 @pytest.fixture

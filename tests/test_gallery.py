@@ -16,7 +16,7 @@ from lfcore.errors import Cancelled, InputError
 from lfcore.formats.glance import Glance
 from lfcore.thumbnails import ThumbnailStore
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 PICTURE = np.zeros((2, 3, 3), np.uint8)
 
 

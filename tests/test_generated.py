@@ -1,3 +1,5 @@
+import functools
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +15,7 @@ from lfcore.errors import InputError
 from lfcore.export import write_picture
 from lfcore.formats import open_light_field
 from lfcore.planesweep import Levels
-from lfcore.training.generated import ContentConfig, SceneConfig, Textures, generate_pool, generate_scene
+from lfcore.training.generated import ContentConfig, GeneratedScene, SceneConfig, Textures, generate_pool, generate_scene
 from lfcore.training.patches import PatchConfig, TrainingScene, sample_group
 from lfcore.training.scenes import shapes, surfaces
 from lfcore.training.scenes.arrangement import arrange, draw_range
@@ -238,10 +240,19 @@ def test_ranges_of_disparity_are_drawn_as_told() -> None:
     assert np.abs(narrow).max() <= 3
 
 
-def test_disparities_of_a_scene_keep_to_their_range() -> None:
+@functools.cache
+def small_scenes() -> tuple[list[GeneratedScene], list[GeneratedScene]]:
+    """Dark and bright ones of 2 x 2 views and disparities up to 5 px, for the tests that only look at them."""
     config = replace(SMALL, height=48, width=48, views=2, content=ContentConfig(largest_disparity=5.0))
-    for seed in range(6):
-        scene = generate_scene(seed, Textures(), config)
+    dark, bright = (replace(config, camera=replace(CameraConfig(), dark_share=share)) for share in (1.0, 0.0))
+    return (
+        [generate_scene(seed, Textures(), dark) for seed in range(4)],
+        [generate_scene(seed, Textures(), bright) for seed in range(4, 8)],
+    )
+
+
+def test_disparities_of_a_scene_keep_to_their_range() -> None:
+    for scene in itertools.chain(*small_scenes()):
         assert -5 <= scene.low == scene.disparity.min() < scene.disparity.max() == scene.high <= 5
 
 
@@ -294,11 +305,7 @@ def test_the_camera_of_each_scene_keeps_to_the_ranges() -> None:
 
 
 def test_dark_scenes_are_dark_and_others_are_not() -> None:
-    def mean(seed: int, share: float) -> float:
-        config = replace(SMALL, views=2, height=64, width=64, camera=replace(CameraConfig(), dark_share=share))
-        return float(generate_scene(seed, Textures(), config).light_field.views.mean()) / 255
-
-    dark, bright = ([mean(seed, share) for seed in range(4)] for share in (1.0, 0.0))
+    dark, bright = ([scene.light_field.views.mean() / 255 for scene in scenes] for scenes in small_scenes())
     assert 0.05 < np.mean(dark) < 0.25
     assert 0.3 < np.mean(bright) < 0.65
 

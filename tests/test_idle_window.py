@@ -38,7 +38,7 @@ def test_views_are_computed_ahead_after_a_single_movement_of_the_mouse(screen: V
         for place in range(4):  # each puts off what is computed ahead, and begins the wait for it anew
             screen.xdotool("mousemove", BESIDE[0] + place, BESIDE[1])
             before = noted()
-            wait_until(lambda before=before: noted() > before, "views computed ahead", 20.0)  # type: ignore[misc]
+            wait_until(lambda before=before: noted() > before, "views computed ahead")  # type: ignore[misc]
             if noted() >= 4 * 4:
                 break
 
@@ -56,5 +56,5 @@ def test_a_burst_of_keys_is_taken_to_its_end(screen: VirtualScreen, tmp_path: Pa
     with screen.program(PROGRAM, str(save(light_field(4, 4, VIEW), tmp_path)), str(tmp_path / "notes")) as program:
         wait_until(lambda: (tmp_path / "notes").exists(), "the first synthesis")
         screen.xdotool("key", "--delay", 1, *("1", "2", "4", "5") * 40, "ctrl+q")
-        wait_until(lambda: program.poll() is not None, "the last of the keys", 20.0)
+        wait_until(lambda: program.poll() is not None, "the last of the keys")
         assert program.returncode == 0

@@ -159,7 +159,7 @@ def test_weights_are_asked_for_when_they_are_looked_at() -> None:
 
 
 def run_until(controller: Controller, condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < deadline
         controller.tick(time.monotonic())

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from moving_scene import DISPARITY, light_field, truth
 from test_whole_program import BESIDE, EXACT, INSIDE, PROGRAM, VIEW, save, shown, shows
-from virtual_screen import VirtualScreen, wait_until
+from virtual_screen import VirtualScreen, comes, wait_until
 
 from app.looking import LEVEL_STEP
 from app.tone import Curve, Tone, toned
@@ -68,8 +68,11 @@ def test_tones_insides_sway_and_the_inspector(screen: VirtualScreen, tmp_path: P
         assert shows(screen, stored, EXACT)
 
         # A double click fits, the next one goes back to 1:1.
-        screen.xdotool("click", "--repeat", 2, "--delay", 60, 1)
-        wait_until(lambda: not shows(screen, stored, 0.1), "the fitted picture")
+        for _ in range(10):  # two clicks are a double click where the window draws frames fast enough
+            screen.xdotool("click", "--repeat", 2, "--delay", 60, 1)
+            if comes(lambda: not shows(screen, stored, 0.1), 3.0):
+                break
+        assert not shows(screen, stored, 0.1)  # the fitted picture
         screen.xdotool("key", "z")
         wait_until(lambda: shows(screen, stored, EXACT), "1:1")
 

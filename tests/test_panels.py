@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app import panels, theme
@@ -13,6 +15,7 @@ from app.dialogs import Purpose
 from app.geometry import place
 from app.keyboard import _CHARACTERS, _KEYS
 from app.layout import Layout, lay_out
+from app.painting import CORNER_BYTES
 from app.picture import DRAG_SPAN
 from app.readout import Compared, Readout, ScoreText
 from app.state import Grid, Look, Step, Tab, ViewState
@@ -52,6 +55,12 @@ class Screen:
             for texture in self.imgui.get_draw_data().textures:
                 texture.set_status(self.imgui.ImTextureStatus.ok)
             self.requests += requests
+
+    def drawn(self) -> bytes:
+        """Place and colour of all corners of the last frame's triangles, by which frames can be told apart."""
+        lists = [commands.vtx_buffer for commands in self.imgui.get_draw_data().cmd_lists]
+        read = b"".join(ctypes.string_at(corners.data_address(), corners.size() * CORNER_BYTES) for corners in lists)
+        return np.delete(np.frombuffer(read, np.uint8).reshape(-1, CORNER_BYTES), range(8, 16), 1).tobytes()
 
     def _begin(self, layout: Layout) -> None:
         self.begun.append((layout, self.state.u, self.state.v))
@@ -415,12 +424,21 @@ STATES = {
 def test_every_state_draws_in_every_size(imgui_context: Any, name: str, size: tuple[int, int], scale: float) -> None:
     screen = Screen(imgui_context, scale)
     screen.size, screen.readout = size, STATES[name]
-    screen.state.help = screen.state.path_field = True
+    screen.frame(3)
+    before = screen.drawn()
+    for card in ("help", "path_field"):
+        setattr(screen.state, card, True)
+        screen.frame(3)
+        assert screen.drawn() != before
+        before = screen.drawn()
+    screen.move(size[0] / 3, size[1] / 3)
+    screen.frame(20)  # what comes a while after the mouse has
+    looks = set()
     for look in Look:
         screen.state.look = look
-        screen.move(size[0] / 3, size[1] / 3)
-        data = imgui_context.get_draw_data()
-        assert data.total_vtx_count > 0
+        screen.frame(2)
+        looks.add(screen.drawn())
+    assert len(looks) == (1 if screen.readout.grid is None else len(Look))
     picture = screen.layout.picture
     assert picture.width > 0
     assert picture.height > 0

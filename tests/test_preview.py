@@ -25,7 +25,7 @@ from tests.plane_scenes import slanted_scene
 
 
 def _until(controller: Controller, condition: Callable[[], bool]) -> None:
-    deadline, now = time.monotonic() + 10, 0.0
+    deadline, now = time.monotonic() + 60, 0.0
     while not condition():
         assert time.monotonic() < deadline
         now += 0.01
@@ -41,7 +41,7 @@ def test_the_coarse_picture_gives_way_to_the_light_field() -> None:
     synthesizer, go = TruthSynthesizer(), threading.Event()
 
     def opened(*_: object) -> LightField:
-        go.wait(10)
+        go.wait(60)
         return light_field(3, 3)
 
     controller = _controller(synthesizer, opened)

@@ -39,6 +39,18 @@ def light_field(
     return LightField((values * scale).astype(dtype), "noise", "tests", "made up")
 
 
+class Began:
+    """A query to a model that has much patience, and a file that is there once it has begun."""
+
+    def __init__(self, process: SynthesisProcess, folder: Path) -> None:
+        self._file = folder / "began"
+        self.synthesizer = RemoteSynthesizer(process, f"patient {self._file}")
+        self.synthesizer.set_light_field(light_field())
+
+    def wait(self) -> None:
+        wait_until(self._file.exists, "the query to begin")
+
+
 @pytest.fixture(scope="module")
 def process() -> Iterator[SynthesisProcess]:
     with SynthesisProcess(make) as started:
@@ -196,25 +208,29 @@ def test_it_stands_back_half_as_far_until_its_first_synthesis_and_then_with_all_
         assert priorities(process) == {whole}
 
 
-def test_whoever_waits_for_another_query_can_give_up(process: SynthesisProcess) -> None:
-    stop = threading.Event()
-    patient, other = (RemoteSynthesizer(process, "patient") for _ in range(2))
-    for synthesizer in (patient, other):
-        synthesizer.set_light_field(light_field())
+def test_whoever_waits_for_another_query_can_give_up(process: SynthesisProcess, tmp_path: Path) -> None:
+    stop, held = threading.Event(), Began(process, tmp_path)
+    other = RemoteSynthesizer(process, "blender")
+    other.set_light_field(light_field())
+    cancelled: list[bool] = []
 
     def hold() -> None:
         with pytest.raises(Cancelled):
-            patient.synthesize(0.5, 0.5, stop.is_set)
+            held.synthesizer.synthesize(0.5, 0.5, stop.is_set)
+        cancelled.append(True)
 
     holder = threading.Thread(target=hold)
     holder.start()
     try:
-        time.sleep(0.1)
+        held.wait()
+        began = time.monotonic()
         with pytest.raises(Cancelled):
             other.synthesize(0.5, 0.5, lambda: True)
+        assert time.monotonic() - began < PATIENT_SECONDS / 3  # long before the other's end
     finally:
         stop.set()
         holder.join(PATIENCE)
+    assert cancelled == [True]
 
 
 def test_a_process_that_ends_by_itself_is_started_anew() -> None:
@@ -228,14 +244,20 @@ def test_a_process_that_ends_by_itself_is_started_anew() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-def test_a_killed_process_is_told_of_and_started_anew() -> None:
+def test_a_killed_process_is_told_of_and_started_anew(tmp_path: Path) -> None:
     with SynthesisProcess(make) as process:
-        patient = RemoteSynthesizer(process, "patient")
-        patient.set_light_field(light_field())
+        query = Began(process, tmp_path)
         killed = pid_of(process)
-        threading.Timer(0.3, os.kill, (killed, signal.SIGKILL)).start()
+
+        def kill() -> None:
+            query.wait()
+            os.kill(killed, signal.SIGKILL)
+
+        killing = threading.Thread(target=kill)
+        killing.start()
         with pytest.raises(LfviewError, match="SIGKILL; if memory ran out"):
-            patient.synthesize(0.5, 0.5)
+            query.synthesizer.synthesize(0.5, 0.5)
+        killing.join(PATIENCE)
         asked(process, "blender", light_field())
         assert pid_of(process) != killed
 
@@ -264,21 +286,20 @@ def test_closing_ends_the_process_and_frees_the_memory() -> None:
         os.kill(pid, 0)
 
 
-def test_closing_does_not_wait_for_a_query(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closing_does_not_wait_for_a_query(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(remote, "_END_SECONDS", 0.2)
     process = SynthesisProcess(make)
-    patient = RemoteSynthesizer(process, "patient")
-    patient.set_light_field(light_field())
+    query = Began(process, tmp_path)
     failed: list[LfviewError] = []
 
     def ask() -> None:
         with pytest.raises(LfviewError) as error:
-            patient.synthesize(0.5, 0.5)
+            query.synthesizer.synthesize(0.5, 0.5)
         failed.append(error.value)
 
     asking = threading.Thread(target=ask)
     asking.start()
-    time.sleep(0.2)
+    query.wait()
     process.close()
     asking.join(PATIENCE)
     assert len(failed) == 1 and process.pid is None
@@ -297,9 +318,16 @@ def test_it_ends_with_a_program_that_is_killed() -> None:
     try:
         assert program.stdout is not None
         child = Path("/proc") / program.stdout.readline().strip()
-        assert child.is_dir()
+
+        def has_ended() -> bool:
+            try:
+                return "(zombie)" in (child / "status").read_text()
+            except OSError:  # it is no longer there
+                return True
+
+        assert not has_ended()
         program.kill()
-        wait_until(lambda: not child.is_dir() or "(zombie)" in (child / "status").read_text(), "the process to end")
+        wait_until(has_ended, "the process to end")
     finally:
         program.kill()
         program.wait(PATIENCE)

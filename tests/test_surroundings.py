@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from moving_scene import TruthSynthesizer, light_field
 from test_formats import plain, random_views, save_views
+from test_watching import first_look
 
 from app import dialogs
 from app.commands import Action, Ask, Browse
@@ -28,7 +29,7 @@ from app.watching import Change, Watching
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 class Program:
@@ -207,9 +208,9 @@ def test_a_file_that_has_changed_is_said_and_opened_again_as_it_was_looked_at(
     program = Program()
     made.append(program)
     (tmp_path / "3x3").write_text("a stand-in")
+    looked = first_look(monkeypatch, tmp_path / "3x3")
     program.open(str(tmp_path / "3x3"))
-    time.sleep(0.3)  # the first look
-    program.tick()
+    assert looked.wait(PATIENCE)
     (tmp_path / "3x3").write_text("another")
     program.until(lambda: bool(program.controller.messages))
     assert "has changed on disk" in program.controller.messages[0]

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from lfcore.compact import CompactModel
 from lfcore.networks import FullModel, PaperStack, initialise
+from lfcore.training import loop
 from lfcore.training.conditioning import condition, plain_copy
 from lfcore.training.loop import Progress, Runtime, TrainConfig, train
 from lfcore.training.loss import LossConfig
@@ -105,7 +106,10 @@ def run(given: Weights, folder: Path, name: str, stop_at: int | None = None) -> 
     return reports
 
 
-def test_a_run_without_revival_trains_the_others_and_saves_the_papers_shape(tmp_path: Path) -> None:
+def test_a_run_without_revival_trains_the_others_and_saves_the_papers_shape(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "_LOOKED_AT", 4)  # patches, which would take longer than the steps
     save_weights(tmp_path / "given.safetensors", with_idle_channels(), {})
     given = load_weights(tmp_path / "given.safetensors")
     run(given, tmp_path, "straight")

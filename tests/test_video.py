@@ -191,7 +191,7 @@ def test_ctrl_c_leaves_no_half_file(tmp_path: Path) -> None:
         assert len(list(tmp_path.iterdir())) == 1  # the temporary file
         process.send_signal(signal.SIGINT)
         try:
-            assert process.wait(timeout=10) != 0
+            assert process.wait(timeout=60) != 0
         finally:
             process.kill()  # else the end of this block would wait for one that went on
     assert list(tmp_path.iterdir()) == []

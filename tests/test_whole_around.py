@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +49,9 @@ def test_from_a_folder_to_a_view_and_back_in_the_next_run(screen: VirtualScreen,
         screen.xdotool("key", "Return")
         wait_until(lambda: (screen.xdotool("key", "z"), shows(screen, truth(0.5, 0.5, VIEW), EXACT))[1], "the light field")
         # The disparity by the palette.
-        screen.xdotool("key", "ctrl+p")
-        time.sleep(0.5)
+        wait_until(screen.still, "nothing more to be computed")
+        screen.press_and_see("ctrl+p", "the palette")
+        wait_until(lambda: screen.still(but_for_a_caret=True), "the palette to take keys")
         screen.xdotool("type", "--delay", 40, "disparity, in col")
         screen.xdotool("key", "Return")
         wait_until(lambda: shows(screen, disparity, 3 / 255), "the disparity")

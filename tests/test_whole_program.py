@@ -122,9 +122,9 @@ def test_a_faulty_path_is_said_and_the_viewer_lives_on(screen: VirtualScreen, fo
         screen.xdotool("mousemove", *BESIDE)
         screen.xdotool("key", "Escape")
         wait_until(lambda: not message_shown(), "the message to go")
-        screen.xdotool("key", "ctrl+shift+o")
-        field = screen.pixels()
-        wait_until(lambda: bool((screen.pixels() != field).any()), "the path field", 5.0)
+        wait_until(screen.still, "the start picture")
+        screen.press_and_see("ctrl+shift+o", "the path field")
+        wait_until(lambda: screen.still(but_for_a_caret=True), "the path field to take keys")
         link = tmp_path / "field"
         link.symlink_to(folder)
         screen.xdotool("type", "--delay", 40, str(link))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import av
@@ -35,9 +34,9 @@ def test_open_drag_look_wipe_refocus_export_close(screen: VirtualScreen, tmp_pat
         screen.xdotool("mousemove", *BESIDE)
 
         # Open by its path.
-        wait_until(lambda: _still(screen), "the start picture")
-        _press_and_see(screen, "ctrl+shift+o", "the path field")
-        wait_until(lambda: _still(screen, but_for_a_caret=True), "the path field to take keys")
+        wait_until(screen.still, "the start picture")
+        screen.press_and_see("ctrl+shift+o", "the path field")
+        wait_until(lambda: screen.still(but_for_a_caret=True), "the path field to take keys")
         link = tmp_path / "field"  # a short path, so that typing it takes no time
         link.symlink_to(views)
         screen.xdotool("type", "--delay", 40, str(link))
@@ -54,8 +53,8 @@ def test_open_drag_look_wipe_refocus_export_close(screen: VirtualScreen, tmp_pat
         # Every look of the number row, and back.
         pictures = set()
         for key in ("2", "4", "5", "9", "0", "1"):
-            _press_and_see(screen, key, f"the look of key {key}")
-            wait_until(lambda: _still(screen), "its end")
+            screen.press_and_see(key, f"the look of key {key}")
+            wait_until(screen.still, "its end")
             pictures.add(screen.pixels().tobytes())
         assert len(pictures) == 6
 
@@ -74,7 +73,7 @@ def test_open_drag_look_wipe_refocus_export_close(screen: VirtualScreen, tmp_pat
         screen.xdotool("key", "o")
 
         # Export.
-        _press_and_see(screen, "ctrl+e", "the tab Export")
+        screen.press_and_see("ctrl+e", "the tab Export")
         screen.xdotool("key", "ctrl+shift+e")
         video = tmp_path / f"{views.name} sweep.mp4"
         wait_until(video.is_file, "the exported video")
@@ -92,21 +91,6 @@ def test_open_drag_look_wipe_refocus_export_close(screen: VirtualScreen, tmp_pat
         assert program.stderr.read() == ""
 
 
-def _press_and_see(screen: VirtualScreen, keys: str, what: str) -> None:
-    """Press keys that change what is on the screen, and wait until it has changed."""
-    before = screen.pixels().copy()
-    screen.xdotool("key", keys)
-    wait_until(lambda: bool((screen.pixels() != before).any()), what)
-
-
 def _shows_nearly_all(screen: VirtualScreen, viewpoint: tuple[float, float]) -> bool:
     """Whether the picture of that viewpoint is there, but for a line with its handle."""
     return float((np.abs(shown(screen) - truth(*viewpoint, VIEW)).max(2) <= EXACT).mean()) > 0.9
-
-
-def _still(screen: VirtualScreen, but_for_a_caret: bool = False) -> bool:
-    """Whether nothing changes on the screen for half a second, which is not so while the program starts."""
-    before = screen.pixels().astype(int)
-    time.sleep(0.5)
-    changed = int((np.abs(screen.pixels() - before).max(2) > 8).sum())
-    return changed <= (100 if but_for_a_caret else 0)

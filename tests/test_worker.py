@@ -11,7 +11,7 @@ import pytest
 from app.worker import Cancel, Done, Failed, Job, LatestWorker
 from lfcore.errors import Cancelled, InputError
 
-PATIENCE = 10.0
+PATIENCE = 60.0
 
 
 @pytest.fixture

@@ -35,12 +35,19 @@ def require_tools() -> None:
         pytest.skip(f"not installed: {', '.join(missing_tools())} (on Debian: xvfb, xdotool)")
 
 
-def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
-    """Wait for the condition, at most so many seconds."""
+def comes(condition: Callable[[], bool], patience: float) -> bool:
+    """Whether the condition holds within so many seconds."""
     deadline = time.monotonic() + patience
     while not condition():
-        assert time.monotonic() < deadline, f"waited {patience:.0f} s for {what}"
+        if time.monotonic() >= deadline:
+            return False
         time.sleep(0.03)
+    return True
+
+
+def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
+    """Wait for the condition, at most so many seconds."""
+    assert comes(condition, patience), f"waited {patience:.0f} s for {what}"
 
 
 # Between reaching a place, pressing there and moving on: no hand does all three between two frames.
@@ -86,6 +93,19 @@ class VirtualScreen:
         time.sleep(_HAND_SECONDS)
         for part in (1, 2, 3):
             self.xdotool("mousemove", start[0] + delta[0] * part // 3, start[1] + delta[1] * part // 3)
+
+    def press_and_see(self, keys: str, what: str) -> None:
+        """Press keys that change what is on the screen, and wait until it has changed."""
+        before = self.pixels().copy()
+        self.xdotool("key", keys)
+        wait_until(lambda: bool((self.pixels() != before).any()), what)
+
+    def still(self, but_for_a_caret: bool = False) -> bool:
+        """Whether nothing changes on the screen for half a second, which is not so while the program starts."""
+        before = self.pixels().astype(int)
+        time.sleep(0.5)
+        changed = int((np.abs(self.pixels() - before).max(2) > 8).sum())
+        return changed <= (100 if but_for_a_caret else 0)
 
     @contextmanager
     def program(self, code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
