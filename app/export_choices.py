@@ -234,6 +234,13 @@ class ExportChoices:
         path = self.target_path
         return quilt_path(path, self.quilt, view) if self.product is Product.QUILT else path
 
+    def replaces(self, view: tuple[int, int]) -> bool:
+        """Whether there is a file already where that is made; not, where that cannot be seen."""
+        try:
+            return self.made(view).is_file()
+        except OSError:
+            return False
+
     @property
     def target(self) -> Target:
         """Where a sweep goes."""

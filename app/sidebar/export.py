@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from enum import Enum
 from typing import TypeVar
 
@@ -199,7 +198,7 @@ def _go(context: Context, choices: ExportChoices, readout: Readout, fonts: theme
     with font(fonts.regular, theme.SMALL):
         if fault:
             wrapped(fault, theme.WARNING)
-        elif readout.grid is not None and os.path.isfile(choices.made((readout.grid.width, readout.grid.height))):  # noqa: PTH113  False, too, where it may not be asked
+        elif readout.grid is not None and choices.replaces((readout.grid.width, readout.grid.height)):
             wrapped("Replaces the file of that name", theme.WARNING)
         elif choices.product is Product.SWEEP:
             lasts = f"{choices.frames / choices.fps:.1f} s of video"
