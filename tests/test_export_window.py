@@ -97,6 +97,11 @@ def test_an_export_that_is_not_finished_at_the_end_leaves_nothing(
             return any(place.glob(".scene sweep*"))  # the temporary file
 
         wait_until(begun, "the export to begin")
+        message = (slice(0, 60), slice(300, 600))  # at the top of the picture
+        before = screen.pixels()[message]
+        screen.xdotool("key", "ctrl+q")
+        wait_until(lambda: bool((screen.pixels()[message] != before).mean() > 0.3), "the question whether it is to be given up")
+        assert program.poll() is None
         screen.xdotool("key", "ctrl+q")
         assert program.wait(60) == 0
     assert list(place.iterdir()) == [folder]
