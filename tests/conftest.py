@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import re
 import shutil
 import signal
 import tempfile
@@ -39,6 +40,17 @@ def sigterm() -> Iterator[None]:
     before = signal.getsignal(signal.SIGTERM)
     yield
     signal.signal(signal.SIGTERM, before)
+
+
+_OF_THE_PROGRAM = re.compile(r"^(from|import) app\b(?!\.cli)", re.MULTILINE)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of the program itself are marked: see `alone` in pyproject.toml."""
+    concerned = {path: _OF_THE_PROGRAM.search(path.read_text(encoding="utf-8")) for path in {item.path for item in items}}
+    for item in items:
+        if concerned[item.path] is not None:
+            item.add_marker("alone")
 
 
 @pytest.fixture(scope="session")

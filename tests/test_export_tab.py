@@ -13,6 +13,7 @@ import pytest
 from privileges import without_privileges
 
 from app import dialogs
+from app.asking import Asking
 from app.controller import Controller
 from app.dialogs import Answered, Purpose, Question
 from app.engine import Engine, ModelChoice
@@ -251,7 +252,8 @@ def test_a_broken_path_is_told(controller: Controller, tmp_path: Path) -> None:
     assert "radius" in controller.messages[0]
 
 
-def test_the_preview_moves_the_viewpoint_until_it_is_dragged(controller: Controller) -> None:
+def test_the_preview_moves_the_viewpoint_until_it_is_dragged(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Asking, "ask", lambda *_: None)  # a synthesis that comes would be faded in, frame by frame
     export = controller.state.export
     export.frames, export.fps = 8, 2
     stops = export.plan().stops()
