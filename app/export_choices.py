@@ -250,7 +250,7 @@ class ExportChoices:
     def fault(self) -> str:
         """Why it cannot be exported as chosen; empty where it can."""
         if not self.name.strip() or "/" in self.name or "\0" in self.name or self.name.strip() in (".", ".."):
-            return "Give the export a name without slashes."
+            return "Give the export a name, not . or .., and without slashes."
         try:
             if self.product is Product.SWEEP:
                 check_fits(self.plan(), self.format.kind)

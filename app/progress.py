@@ -8,6 +8,8 @@ import time
 from types import TracebackType
 from typing import TextIO
 
+from app.limits import within
+
 _WIDTH = 24
 _INTERVAL = 0.1  # seconds between two drawings
 _ERASE = "\r\x1b[K"
@@ -59,7 +61,7 @@ class Progress:
 
 def bar(label: str, done: float, total: float, unit: str, seconds: float) -> str:
     """One line: label, bar, count with its unit, rate and time left once they are known."""
-    share = min(max(done / total, 0), 1) if total > 0 else 0
+    share = within(done / total, (0.0, 1.0)) if total > 0 else 0.0
     filled = round(share * _WIDTH)
     text = f"{label} [{'#' * filled}{'.' * (_WIDTH - filled)}] "
     text += f"{done:.0f}/{total:.0f} {unit}" if unit else f"{100 * share:.0f}%"

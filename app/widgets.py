@@ -50,9 +50,9 @@ def decibels(value: float) -> str:
     return f"{number(value, 2)} dB" if math.isfinite(value) else "equal"
 
 
-def counted(count: int, one: str, more: str | None = None) -> str:
-    """So many of something; `more`: what several are called where that is not `one` with an s."""
-    return f"{count} {one if count == 1 else more or f'{one}s'}"
+def counted(count: int, one: str) -> str:
+    """So many of something, whose plural has an s."""
+    return f"{count} {one}" if count == 1 else f"{count} {one}s"
 
 
 def milliseconds(value: float) -> str:

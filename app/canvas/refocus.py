@@ -18,6 +18,7 @@ from app.canvas.gathered import Captured, Gathered, Synthesized
 from app.canvas.passes import Passes
 from app.canvas.textures import Picture, Textures, make_texture
 from app.geometry import Point
+from app.limits import within
 from app.tone import Tone
 from lfcore.refocus import aperture_weights
 
@@ -139,7 +140,7 @@ class Refocused:
     @property
     def _chunk_size(self) -> int:
         width, height = self._textures.size
-        return min(max(_READS_PER_FRAME // (width * height * _TAPS) - 1, 1), _MOST)
+        return within(_READS_PER_FRAME // (width * height * _TAPS) - 1, (1, _MOST))
 
     def _sum_up(self, gathered: Gathered) -> None:
         sums = self._at_hand

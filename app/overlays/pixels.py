@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app import theme
 from app.geometry import Placement, Rect, Size
+from app.limits import within
 from app.panes import Pane
 from app.readout import Readout
 from app.samples import Part, Patch
@@ -74,7 +75,7 @@ def _values(brush: imgui.ImDrawList, placement: Placement, patch: Patch, scale: 
     lines = max(rows, _LINES)
     if placement.scale < lines * _SMALLEST * scale:
         return
-    size = min(max(placement.scale / (lines + 0.55), _SMALLEST * scale), _LARGEST * scale)
+    size = within(placement.scale / (lines + 0.55), (_SMALLEST * scale, _LARGEST * scale))
     drop = (placement.scale - rows * size) / 2
     on_light, on_dark = packed(_ON_LIGHT), packed(_ON_DARK)
     face, indent = imgui.get_font(), placement.scale * 0.14
