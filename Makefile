@@ -46,7 +46,7 @@ run: $(VENV)/ready window-packages
 test: $(VENV)/ready-for-tests window-packages test-packages
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
-	$(PYTHON) -m pytest -n 2 -m "not alone"
+	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "not alone"
 	$(PYTHON) -m pytest -m alone
 
 # The small pair first, since it teaches the paper's pair: about 3, 3 and 1 hours on two cores. Each goes on where it was stopped.

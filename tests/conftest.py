@@ -27,6 +27,10 @@ os.environ["LFVIEW_CACHE"] = str(Path(_KEPT) / "kept")
 os.environ["XDG_CACHE_HOME"] = str(Path(_KEPT) / "cache")
 os.environ["XDG_CONFIG_HOME"] = str(Path(_KEPT) / "config")
 
+# Tests that run beside each other share out the cores; else torch's threads would wait for each other, for half of the time.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OMP_NUM_THREADS", str(max((os.cpu_count() or 1) // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]), 1)))
+
 # A software context, so that the tests see the same pictures on every machine.
 os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
 
@@ -42,7 +46,7 @@ def sigterm() -> Iterator[None]:
     signal.signal(signal.SIGTERM, before)
 
 
-_OF_THE_PROGRAM = re.compile(r"^(from|import) app\b(?!\.cli)", re.MULTILINE)
+_OF_THE_PROGRAM = re.compile(r"^(from|import) app\b(?!\.(cli|commands|__main__)\b)", re.MULTILINE)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -125,6 +129,17 @@ def either_route(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
         monkeypatch.setattr(kernels, "_KERNELS", None)
     else:
         request.getfixturevalue("compiled_kernels")
+
+
+@pytest.fixture
+def several_threads() -> Iterator[None]:
+    """Work is shared out among threads, as it is where nothing runs beside it."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(max(os.cpu_count() or 1, 2))
+    yield
+    torch.set_num_threads(before)
 
 
 @pytest.fixture

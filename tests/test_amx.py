@@ -16,6 +16,8 @@ from lfcore.layers import DirectConvolution, Way, make_layer
 from lfcore.networks import PaperStack
 from lfcore.tuned_stack import TunedStack, Tuning
 
+pytestmark = pytest.mark.usefixtures("several_threads")
+
 
 @pytest.fixture
 def matrix_unit(compiled_kernels: None) -> None:

@@ -15,6 +15,8 @@ from lfcore.synthesis import Synthesizer
 from lfcore.tone import root_tone, stored_from_root
 from lfcore.tuned_stack import Tuning
 
+pytestmark = pytest.mark.usefixtures("several_threads")
+
 
 def untrained(tuning: Tuning | None = None) -> Synthesizer:
     """The small pair with the weights from which training starts."""

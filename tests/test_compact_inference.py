@@ -18,7 +18,7 @@ from lfcore.synthesizer import corner_offsets
 from lfcore.tuned_stack import Tuning
 from lfcore.warp import quick_warp
 
-pytestmark = pytest.mark.usefixtures("either_route")
+pytestmark = pytest.mark.usefixtures("several_threads", "either_route")
 
 SIZE = (28, 36)  # 14 x 18 pixels of half the resolution: neither a multiple of the four that a kernel takes at once
 

@@ -9,6 +9,8 @@ from lfcore.networks import PaperStack
 from lfcore.planesweep import Levels, Window, plane_sweep, sparse_sweep
 from lfcore.synthesizer import corner_offsets
 
+pytestmark = pytest.mark.usefixtures("several_threads")
+
 
 @pytest.mark.usefixtures("either_route")
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])

@@ -8,7 +8,7 @@ from torch import Tensor, nn
 from lfcore.errors import Cancelled
 from lfcore.fourier import LEAST_CHANNELS, SIZE, FourierConvolution
 
-pytestmark = pytest.mark.usefixtures("compiled_kernels")
+pytestmark = pytest.mark.usefixtures("several_threads", "compiled_kernels")
 
 
 def case(channels: tuple[int, int], kernel: int, size: tuple[int, int], mean: float = 0.0) -> tuple[nn.Conv2d, Tensor, Tensor]:

@@ -11,7 +11,7 @@ from lfcore.lightfield import CORNERS
 from lfcore.planesweep import Levels, Window, deviation_sweep, luminance, matching_disparity, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor
 
-pytestmark = pytest.mark.usefixtures("either_route")
+pytestmark = pytest.mark.usefixtures("several_threads", "either_route")
 
 
 def random_luma(seed: int = 0, size: tuple[int, int] = (14, 17), batch: int = 1) -> torch.Tensor:

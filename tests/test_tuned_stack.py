@@ -9,6 +9,8 @@ from lfcore.networks import BORDER, PaperStack
 from lfcore.planesweep import Window
 from lfcore.tuned_stack import TunedStack, Tuning
 
+pytestmark = pytest.mark.usefixtures("several_threads")
+
 
 @pytest.mark.parametrize(
     ("size", "tile"), [((100, 130), (40, 50)), ((376, 541), (200, 288)), ((33, 161), (16, 32)), ((9, 7), (16, 16))]

@@ -9,6 +9,8 @@ from lfcore import tuning
 from lfcore.layers import DirectConvolution, Way
 from lfcore.tuned_stack import Tuning
 
+pytestmark = pytest.mark.usefixtures("several_threads")
+
 CHOICE = Tuning(torch.bfloat16, 208, 32, way=Way.WINOGRAD)
 
 

@@ -6,7 +6,7 @@ from slow import keys_kernel, sample
 
 from lfcore.warp import backward_warp, cubic_taps, quick_sample, quick_warp, source_offset
 
-pytestmark = pytest.mark.usefixtures("either_route")
+pytestmark = pytest.mark.usefixtures("several_threads", "either_route")
 
 
 def test_taps_are_the_kernel_of_keys() -> None:

@@ -16,6 +16,8 @@ from lfcore.kernels import can_convolve
 from lfcore.layers import DirectConvolution, Layer, Way, make_layer
 from lfcore.winograd import WinogradConvolution
 
+pytestmark = pytest.mark.usefixtures("several_threads")
+
 
 def picture(channels: int, height: int, width: int) -> Tensor:
     return torch.randn(1, channels, height, width).to(memory_format=torch.channels_last)
