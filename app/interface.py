@@ -29,6 +29,7 @@ from app.faults import sentence
 from app.gallery import Seen
 from app.geometry import Placement, Point, Rect, Size, place, visible
 from app.layout import Layout, Strips
+from app.more_fonts import MoreFonts
 from app.panel_painting import Piece
 from app.panes import Pane, arrange
 from app.repainting import Layer, Repainting
@@ -77,6 +78,7 @@ class Interface:
         self._canvas = Canvas(context, reach=reach, paints=paints, copy=copy)
         self._atlas = Atlas(context)
         self._fonts = theme.apply(scale)
+        self._more_fonts = MoreFonts(self._fonts)
         self._theme = Theme.DARK
         self._scale = scale
         self._light_field: LightField | None = None  # what the canvas has taken
@@ -149,6 +151,7 @@ class Interface:
         self._synchronise()
         self._change_theme()
         self._atlas.begin()
+        self._more_fonts.follow()
         imgui.backends.opengl3_new_frame()
         imgui.new_frame()
         display = imgui.get_io().display_size
@@ -230,8 +233,8 @@ class Interface:
 
     @property
     def next_frame_in(self) -> float | None:
-        """As Controller.next_frame_in, but 0 also while the picture becomes better with every frame."""
-        return 0.0 if self._canvas.unfinished else self.controller.next_frame_in
+        """As Controller.next_frame_in, but 0 also while each frame makes the picture better, or fonts are looked for."""
+        return 0.0 if self._canvas.unfinished or self._more_fonts.looking else self.controller.next_frame_in
 
     def uncover(self) -> None:
         """The screen has lost something of the window."""
