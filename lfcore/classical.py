@@ -16,6 +16,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from lfcore.camera_colours import CameraColours
 from lfcore.errors import InputError
 from lfcore.lightfield import EXTRAPOLATION_LIMIT, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Shifted, Window, luminance, shifted_inputs
@@ -58,7 +59,8 @@ class PlaneSweepSynthesizer:
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         self._tuning = tuning or Tuning()
-        self._corners: Tensor | None = None  # (4, 3, H, W), as stored
+        self._colours = CameraColours()
+        self._corners: Tensor | None = None  # (4, 3, H, W)
         self._toned: Tensor | None = None  # (4, 3, H, W), the root of it, 1 = the brightest tone
         self._brightest = 1.0
         self._levels = _WIDEST
@@ -70,7 +72,8 @@ class PlaneSweepSynthesizer:
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer: the root tone, in which noise is even, and the range of disparities are found here."""
-        self._corners = corner_tensor(light_field)
+        self._colours = CameraColours(light_field.paleness)
+        self._corners = self._colours.true(corner_tensor(light_field))
         with torch.inference_mode():
             self._brightest = brightest_tone(self._corners)
             self._toned = _toned(self._corners, self._brightest)
@@ -102,7 +105,9 @@ class PlaneSweepSynthesizer:
                 disparity[rows] = found[inside]
                 image[:, rows], warped[:, :, rows] = parts[0][:, inside], parts[1][:, :, inside]
                 clock.lap("colour")
-        return Synthesis(u, v, self.name, picture(image.clamp_(0, 1)), disparity.numpy(), picture(warped), clock.timings())
+        seen = self._colours.stored(picture(image.clamp_(0, 1)), u, v)
+        inputs = self._colours.stored_of_corners(picture(warped))
+        return Synthesis(u, v, self.name, seen, disparity.numpy(), inputs, clock.timings())
 
     @property
     def _context(self) -> int:

@@ -10,6 +10,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
+from lfcore.camera_colours import CameraColours
 from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.compact_inference import Coloured, CompactInference
 from lfcore.compact_parts import Gathered, Places, full_size, phases_of
@@ -53,6 +54,7 @@ class CompactSynthesizer:
         self.dtype = tuning.dtype
         self._networks = CompactInference(model, tuning)
         self._size = 0, 0
+        self._colours = CameraColours()
         self._span = Span()
         self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
         self._corners: Tensor | None = None  # prepared for the warp
@@ -60,7 +62,8 @@ class CompactSynthesizer:
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
-        corners = corner_tensor(light_field)
+        self._colours = CameraColours(light_field.paleness)
+        corners = self._colours.true(corner_tensor(light_field))
         self._size = light_field.height, light_field.width
         self._span = span = span_of(corners, self.config.levels)
         self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
@@ -80,7 +83,8 @@ class CompactSynthesizer:
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         synthesis, gathered, _ = self._computed(u, v, cancelled)
-        return synthesis.with_warped(lambda: self._picture_of_warped(gathered))
+        colours = self._colours
+        return synthesis.with_warped(lambda: colours.stored_of_corners(self._picture_of_warped(gathered)))
 
     def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         """See WeighingSynthesizer; it is put together without the warped inputs."""
@@ -113,7 +117,8 @@ class CompactSynthesizer:
             clock.lap("colour")
             height, width = self._size
             whole = self._span.disparity(full_size(disparity)[:height, :width].contiguous()).numpy()
-            synthesis = LateSynthesis(u, v, self.name, coloured.image.numpy(), whole, None, clock.timings())
+            image = self._colours.stored(coloured.image.numpy(), u, v)
+            synthesis = LateSynthesis(u, v, self.name, image, whole, None, clock.timings())
         return synthesis, gathered, coloured
 
     def _swept(self, luma: Tensor, offsets: Tensor) -> Tensor:

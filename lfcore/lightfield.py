@@ -29,7 +29,8 @@ class LightField:
 
     `views` is (V, U, H, W, 3), uint8 or uint16 as stored in the file, or float32 in units where 1 is white. Row v grows
     downwards, column u to the right; captured view (row, column) sits at u = column / (U - 1), v = row / (V - 1), so that
-    the four corner views span [0, 1]^2. `dark` names the views too dark to be used (outer views of an Illum).
+    the four corner views span [0, 1]^2. `dark` names the views too dark to be used (outer views of an Illum). `paleness` says
+    how much colour the corner views have lost against the middle, in the unit of lfcore.paleness; 0 where that is not known.
     """
 
     views: npt.NDArray[np.generic]  # (V, U, H, W, 3)
@@ -39,6 +40,7 @@ class LightField:
     facts: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     dark: frozenset[tuple[int, int]] = frozenset()
+    paleness: float = 0.0
 
     def __post_init__(self) -> None:
         if self.views.ndim != 5 or self.views.shape[-1] != 3:
@@ -97,8 +99,10 @@ class LightField:
 
     @cached_property
     def content_key(self) -> str:
-        """Hex digest of the pixels and their arrangement: the same for the same light field whatever file it came from."""
-        digest = hashlib.blake2b(repr((self.views.shape, str(self.views.dtype))).encode(), digest_size=16)
+        """Hex digest of the pixels, their arrangement and their paleness: all that a synthesis depends on, whatever file it
+        came from."""
+        described = (self.views.shape, str(self.views.dtype), self.paleness)
+        digest = hashlib.blake2b(repr(described).encode(), digest_size=16)
         for row in self.views:
             digest.update(np.ascontiguousarray(row).data)
         return digest.hexdigest()

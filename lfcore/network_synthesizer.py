@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
+from lfcore.camera_colours import CameraColours
 from lfcore.errors import InputError
 from lfcore.fewer_means import kept_levels, with_fewer_means
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
@@ -54,6 +55,7 @@ class NetworkSynthesizer:
         self._colour = TunedStack(model.colour, self._tuning)
         self._span = Span()
         self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
+        self._colours = CameraColours()
         self._corners: Tensor | None = None  # (4, 3, H, W)
         self._continued: Tensor | None = None  # (4, 3, H + 2 edge, W + 2 edge)
         self._luma: Tensor | None = None  # (4, 1, h + 2 edge, w + 2 edge), what is swept; made smaller where the span says so
@@ -66,7 +68,8 @@ class NetworkSynthesizer:
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer."""
-        self._corners = corners = corner_tensor(light_field)
+        self._colours = CameraColours(light_field.paleness)
+        self._corners = corners = self._colours.true(corner_tensor(light_field))
         self._span = span = span_of(corners, self.config.levels)
         self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
         self._continued = swept = continued_by_others(corners, self._edge, span.shift)
@@ -78,7 +81,7 @@ class NetworkSynthesizer:
         if self._corners is None or self._continued is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        corners, span = self._corners, self._span
+        corners, span, colours = self._corners, self._span, self._colours
         height, width = corners.shape[2:]
         offsets = corner_offsets(u, v)
         clock, check = Clock(), partial(check_cancelled, cancelled)
@@ -94,9 +97,9 @@ class NetworkSynthesizer:
                 put(image, tile.window, self._colour(self._colour.tile_input(h, tile), check))
             clock.lap("colour")
             own = disparity[:, :, BORDER:-BORDER, BORDER:-BORDER].contiguous()
-        seen = picture(image[0].clamp_(0, 1))
+        seen = colours.stored(picture(image[0].clamp_(0, 1)), u, v)
         synthesis = LateSynthesis(u, v, self.name, seen, own[0, 0].numpy(), None, clock.timings())
-        return synthesis.with_warped(lambda: _warped(corners, own, offsets))
+        return synthesis.with_warped(lambda: colours.stored_of_corners(_warped(corners, own, offsets)))
 
     def _found(self, luma: Tensor, offsets: Tensor, clock: Clock, check: Callable[[], None]) -> Tensor:
         """What the disparity network finds, (1, 1, H + 2 BORDER, W + 2 BORDER): as far as the colour network sees."""

@@ -33,6 +33,7 @@ class Take:
     memory: str
     shape: tuple[int, int]  # (H, W)
     dtype: str
+    paleness: float  # of the corner views
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from functools import partial
 import torch
 from torch import Tensor
 
+from lfcore.camera_colours import CameraColours
 from lfcore.errors import InputError
 from lfcore.lightfield import LightField, check_viewpoint
 from lfcore.networks import BORDER, SingleModel, single_features
@@ -25,6 +26,7 @@ class SingleSynthesizer:
         self.config = model.config
         self._tuning = tuning or machine_tuning()
         self._stack = TunedStack(model.colour, self._tuning)
+        self._colours = CameraColours()
         self._inputs: Tensor | None = None  # (1, 12, H + 2 BORDER, W + 2 BORDER), continued beyond their edges
 
     @property
@@ -33,7 +35,8 @@ class SingleSynthesizer:
         return self._tuning.dtype
 
     def set_light_field(self, light_field: LightField) -> None:
-        self._inputs = continued(corner_tensor(light_field), BORDER).flatten(0, 1).unsqueeze(0)
+        self._colours = CameraColours(light_field.paleness)
+        self._inputs = continued(self._colours.true(corner_tensor(light_field)), BORDER).flatten(0, 1).unsqueeze(0)
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._inputs is None:
@@ -47,4 +50,5 @@ class SingleSynthesizer:
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._stack(self._stack.tile_input(features, tile), check))
             clock.lap("colour")
-        return Synthesis(u, v, self.name, picture(image[0].clamp_(0, 1)), None, None, clock.timings())
+        seen = self._colours.stored(picture(image[0].clamp_(0, 1)), u, v)
+        return Synthesis(u, v, self.name, seen, None, None, clock.timings())

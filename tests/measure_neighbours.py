@@ -17,6 +17,7 @@ from lfcore.formats import open_light_field
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import k16
 from lfcore.nearest_inputs import NEIGHBOURS
+from lfcore.paleness import paleness_of_part
 from lfcore.synthesizer import make_synthesizer
 
 _LEAST = 6  # views each way, of which three are kept
@@ -31,7 +32,8 @@ def without_middle(field: LightField) -> tuple[LightField, tuple[float, float], 
         raise InputError(f"{field.name}: found {field.rows} x {field.columns} views; {_LEAST} x {_LEAST} or more are needed.")
     row, column = field.rows // 2, field.columns // 2
     first = (row + 1) % 2, (column + 1) % 2
-    kept = replace(field, views=np.ascontiguousarray(field.views[first[0] :: 2, first[1] :: 2]), dark=frozenset())
+    views = np.ascontiguousarray(field.views[first[0] :: 2, first[1] :: 2])
+    kept = replace(field, views=views, dark=frozenset(), paleness=paleness_of_part(field, 2 * (len(views) - 1)))
     u, v = (column - first[1]) / 2 / (kept.columns - 1), (row - first[0]) / 2 / (kept.rows - 1)
     return kept, (u, v), field.view(row, column)
 

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from multiprocessing.context import SpawnProcess
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
@@ -24,7 +25,7 @@ from lfcore import remote
 from lfcore.errors import Cancelled, InputError, LfviewError, WeightsError
 from lfcore.lightfield import LightField
 from lfcore.remote import RemoteSynthesizer, SynthesisProcess
-from lfcore.synthesizer import MeanSynthesizer
+from lfcore.synthesizer import MeanSynthesizer, make_synthesizer
 from lfcore.weights_header import Stated
 
 PATIENCE = 60.0
@@ -352,6 +353,18 @@ def test_a_shipped_model_gives_the_same_there_and_here() -> None:
     with SynthesisProcess() as process:
         process.start()
         assert np.array_equal(asked(process, "mean", field).image, here.synthesize(0.5, 0.5).image)
+
+
+def test_how_pale_corners_are_is_known_there_too() -> None:
+    field = replace(light_field(), paleness=1.0)
+    here = make_synthesizer("planesweep")
+    here.set_light_field(field)
+    expected = here.synthesize(0.5, 0.5).image
+    with SynthesisProcess() as process:
+        process.start()
+        np.testing.assert_allclose(asked(process, "planesweep", field).image, expected, atol=1e-4)
+        told_nothing = asked(process, "planesweep", replace(field, paleness=0.0)).image
+    assert np.abs(told_nothing - expected).max() > 1e-2
 
 
 def test_a_program_that_asks_does_not_load_torch() -> None:

@@ -6,13 +6,11 @@ import numpy as np
 
 from lfcore.disparity_sign import DisparityCheck, Order, check_disparity
 from lfcore.formats.images import depth_name
-from lfcore.lightfield import LightField
+from lfcore.lightfield import FloatArray, LightField
+from lfcore.paleness import seems_linear
 
 # Disparities beyond this, in px over the full baseline, lie outside the levels of the paper's networks (see lfcore.span).
 _SWEEP_LIMIT = 21.0
-
-# Pictures whose median is darker than this share of white were most likely stored without gamma.
-_LINEAR_MEDIAN = 0.16
 
 
 def describe(light_field: LightField, check: DisparityCheck | None = None) -> dict[str, str]:
@@ -28,6 +26,11 @@ def describe(light_field: LightField, check: DisparityCheck | None = None) -> di
         "Disparity": _disparity(light_field, check),
         "Order of views": check.sentence,
     }
+    if light_field.paleness:
+        facts["Colours"] = (
+            "outer views of an Illum's ESLF are paler than inner ones; syntheses take that into account "
+            f"({light_field.paleness:.0%} of what the corners of the middle 8 x 8 have)"
+        )
     if light_field.dark:
         facts["Dark views"] = f"{len(light_field.dark)} of {light_field.rows * light_field.columns}: {_dark(light_field)}"
     facts.update(light_field.facts)
@@ -39,8 +42,11 @@ def describe(light_field: LightField, check: DisparityCheck | None = None) -> di
 
 def median_level(light_field: LightField) -> float:
     """Median stored value of the centre view, as a share of white."""
-    view = light_field.view(light_field.rows // 2, light_field.columns // 2)
-    return float(np.median(view[::4, ::4]))
+    return float(np.median(_middle(light_field)))
+
+
+def _middle(light_field: LightField) -> FloatArray:
+    return light_field.view(light_field.rows // 2, light_field.columns // 2)[::4, ::4]
 
 
 def tone(light_field: LightField) -> str:
@@ -50,7 +56,7 @@ def tone(light_field: LightField) -> str:
         return f"linear light, as float pictures usually are ({level})"
     if light_field.kind == "ESLF":
         return f"as stored in the ESLF, without gamma ({level})"
-    if median_level(light_field) < _LINEAR_MEDIAN:
+    if seems_linear(_middle(light_field)):
         return f"dark, so probably without gamma ({level})"
     return f"probably with gamma applied ({level})"
 

@@ -13,6 +13,7 @@ from lfcore.formats.checks import warned_of_white
 from lfcore.formats.dark import find_dark_views, has_dark_corner
 from lfcore.formats.images import Header, Picture, Pixels, check_memory, open_picture, read_header
 from lfcore.lightfield import LightField
+from lfcore.paleness import CAMERA_SIZES, paleness_of_eslf
 
 LENSLET = 14
 
@@ -26,9 +27,6 @@ _BLOCK = 4
 # (Measured: far above 2 in an ESLF, 1.1 to 1.6 in 22 ordinary pictures.)
 _PATTERN_RATIO = 2.0
 
-# View sizes that Lytro's own tools write, width by height.
-_CAMERA_SIZES = {(541, 376), (541, 375), (540, 375), (540, 376)}
-
 
 def divides(header: Header) -> bool:
     """Whether the picture is whole blocks of 14 x 14 px that give views of a usable size."""
@@ -39,7 +37,7 @@ def divides(header: Header) -> bool:
 
 def has_camera_size(header: Header) -> bool:
     """Whether the picture has exactly the size of a Lytro Illum's ESLF, such as 7574 x 5264."""
-    return divides(header) and (header.width // LENSLET, header.height // LENSLET) in _CAMERA_SIZES
+    return divides(header) and (header.width // LENSLET, header.height // LENSLET) in CAMERA_SIZES
 
 
 def sniff(path: Path) -> bool:
@@ -98,6 +96,7 @@ def read(
         facts=facts,
         warnings=tuple(warnings),
         dark=dark,
+        paleness=paleness_of_eslf(views - 1),
     )
     return warned_of_white(light_field)
 

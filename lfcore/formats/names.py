@@ -7,7 +7,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -35,6 +35,12 @@ class Grid:
     columns: int
     facts: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    between: tuple[int, int] = (0, 0)  # numbers of rows, and of columns, left out between two that are there
+
+    @property
+    def steps(self) -> tuple[int, int]:
+        """Rows and columns from corner to corner, those that are left out counted."""
+        return (self.rows - 1) * (self.between[0] + 1), (self.columns - 1) * (self.between[1] + 1)
 
 
 def find_grid(folder: Path, pictures: Sequence[Path]) -> Grid:
@@ -62,7 +68,7 @@ def find_grid(folder: Path, pictures: Sequence[Path]) -> Grid:
     if not ignored:
         return grid
     facts = {**grid.facts, "Other pictures": f"{ignored} in the folder, not part of the grid"}
-    return Grid(grid.kind, grid.files, grid.rows, grid.columns, facts, grid.warnings)
+    return replace(grid, facts=facts)
 
 
 def belongs_to_grid(file: Path, pictures: Sequence[Path]) -> bool:
@@ -174,7 +180,8 @@ def _arrange(folder: Path, kind: str, indexed: Iterable[tuple[Index, Path]]) -> 
         facts["Numbers in the names"] = f"rows {_listed(rows)}; columns {_listed(columns)}"
     if len(rows) == len(columns) == 2:
         kind = "corner views"
-    return Grid(kind, ordered, len(rows), len(columns), facts)
+    between = rows[1] - rows[0] - 1, columns[1] - columns[0] - 1
+    return Grid(kind, ordered, len(rows), len(columns), facts, between=between)
 
 
 def _even_steps(folder: Path, axis: str, numbers: set[int]) -> list[int]:

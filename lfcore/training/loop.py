@@ -28,6 +28,7 @@ from lfcore.export import write_picture
 from lfcore.lightfield import LightField
 from lfcore.metrics import check_size, k16, k16_view
 from lfcore.models import Model
+from lfcore.paleness import with_true_colours
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
 from lfcore.training.architectures import Batch, architecture
@@ -93,6 +94,7 @@ class Progress:
 
 def prepare_scene(light_field: LightField) -> TrainingScene:
     """Find the range of disparities of a scene by a plane sweep over its corners, so that shears keep it within the levels.
+    Colours are the true ones, as the synthesizers give them to the networks.
 
     Raises InputError where there are too few views that lie equally far apart along rows and columns.
     """
@@ -102,7 +104,8 @@ def prepare_scene(light_field: LightField) -> TrainingScene:
         grid, even = f"{light_field.rows} x {light_field.columns}", f"{field.rows} x {field.columns}"
         which = "" if even == grid else f", of which {even} lie equally far apart along rows and columns"
         raise InputError(f"{light_field.name} has {grid} views{which}; training needs 3 x 3 or more.")
-    square = LightField(field.views[:side, :side], field.name, field.source, field.kind)
+    field = with_true_colours(field)
+    square = replace(field, views=field.views[:side, :side])
     levels = Levels()
     luma = luminance(corner_tensor(square)).unsqueeze(1)  # (4, 1, H, W)
     window = Window(0, square.height, 0, square.width)
@@ -128,7 +131,7 @@ def _evenly_spaced(light_field: LightField) -> LightField:
         return light_field
     parts = math.gcd(rows - 1, columns - 1)
     views = light_field.views[:: (rows - 1) // parts, :: (columns - 1) // parts]
-    return LightField(views, light_field.name, light_field.source, light_field.kind)
+    return replace(light_field, views=views)
 
 
 def train(

@@ -19,7 +19,6 @@ import numpy.typing as npt
 from lfcore.errors import InputError
 from lfcore.lightfield import CORNERS, FloatArray, LightField, as_float
 from lfcore.planesweep import Levels, Window
-from lfcore.training.scenes.paleness import mixing, outwardness
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def sample_group(scenes: Sequence[TrainingScene], config: PatchConfig, levels: L
     for _ in range(config.group):
         scene = _draw_scene(eligible, rng)
         views = _draw_views(scene, u, v, shape, levels.moved(-shift), config, rng)
-        patches.append(_draw_tone(views, float(u), float(v), config.tone_share, rng))
+        patches.append(_draw_tone(views, config.tone_share, rng))
     stack = np.stack(patches, 1)  # (5, B, H, W, 3): TL, BL, TR, BR, novel
     return replace(_draw_symmetry(stack, window, float(u), float(v), rng), shift=shift)
 
@@ -217,29 +216,21 @@ def _draw_shear(scene: TrainingScene, spacing: int, levels: Levels, config: Patc
 _ENCODED_MEAN = 0.25
 
 
-def _draw_tone(views: FloatArray, u: float, v: float, share: float, rng: np.random.Generator) -> FloatArray:
+def _draw_tone(views: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
     """Another tone for the five views (5, H, W, 3), the same for all: exposure, white balance, gamma.
 
-    The channels keep their places: an Illum's outer views are paler than its inner ones, each channel in its own measure. So
-    a picture that is made linear, as an ESLF is, gets that from an Illum too.
+    The channels keep their places: a camera's outer views may differ from its inner ones, each channel in its own measure.
     """
     if rng.random() >= share:
         return views
     if float(views[:4, ::5, ::5].mean()) > _ENCODED_MEAN and rng.random() < 0.5:
         # Glints that a display's tone has pressed together stand out again.
-        views = _pale(np.power(views, np.float32(rng.normal(2.1, 0.2))), u, v, rng.uniform(0.6, 1.4))
+        views = np.power(views, np.float32(rng.normal(2.1, 0.2)))
     else:
         views = np.power(views, np.float32(np.exp(np.clip(rng.normal(0.1, 0.35), -0.8, 0.8))))
     gains = (rng.uniform(0.7, 1.25) * rng.uniform(0.9, 1.1, 3)).astype(np.float32)
     toned: FloatArray = np.minimum(views * gains, 1)
     return toned
-
-
-def _pale(views: FloatArray, u: float, v: float, paleness: float) -> FloatArray:
-    """Corner views paler than the novel one, as far as (u, v) lies inward of them."""
-    outward = np.array([*(outwardness(p, q) for p, q in CORNERS), outwardness(u, v)])
-    mixed: FloatArray = np.einsum("nhwc,ndc->nhwd", views, mixing(paleness * outward), optimize=True)
-    return mixed
 
 
 def _draw_symmetry(stack: FloatArray, window: Window, u: float, v: float, rng: np.random.Generator) -> PatchGroup:

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from lfcore.lightfield import FloatArray
-from lfcore.training.scenes.paleness import mixing
+from lfcore.paleness import mixing
 
 Range = tuple[float, float]
 
@@ -27,8 +27,8 @@ class CameraConfig:
     wandering: Range = (0.0, 0.012)  # deviation of each view's (u, v), in baselines
     gain_deviation: Range = (0.0, 0.015)  # of the views' brightness, relative
     tint_deviation: Range = (0.0, 0.008)  # of the views' red, green and blue, relative
-    dark_paleness: Range = (0.4, 1.3)  # how far the corner views of an ESLF's scene lose colour, see scenes.paleness
-    bright_paleness: Range = (0.0, 0.5)  # those of the gamma-encoded ones, as toolboxes decode them
+    # How far the corner views lose colour, see lfcore.paleness, where that of an ESLF has been taken off: as toolboxes decode.
+    paleness: Range = (0.0, 0.4)
     # How much darker the corner views are. Around 0, as in decoded captures: with 0 to 0.12 the networks learnt to brighten
     # every picture by 4%, which cost half a decibel.
     vignette: Range = (-0.015, 0.025)
@@ -47,8 +47,7 @@ FAULTLESS = CameraConfig(
     wandering=(0, 0),
     gain_deviation=(0, 0),
     tint_deviation=(0, 0),
-    dark_paleness=(0, 0),
-    bright_paleness=(0, 0),
+    paleness=(0, 0),
     vignette=(0, 0),
     shading=(0, 0),
     outer_blur=(0, 0),
@@ -86,7 +85,7 @@ def draw_camera(views: int, config: CameraConfig, rng: np.random.Generator) -> C
     gains = gains * (1 + rng.uniform(*config.tint_deviation) * rng.standard_normal((count, 3)))
     gains = gains * (1 - rng.uniform(*config.vignette) * outward[:, None])
     dark = bool(rng.random() < config.dark_share)
-    paleness = rng.uniform(*(config.dark_paleness if dark else config.bright_paleness)) * outward
+    paleness = rng.uniform(*config.paleness) * outward
     return Camera(
         positions=torch.from_numpy((places + wandering).astype(np.float32)),
         shifts=torch.from_numpy(misplacement.astype(np.float32)),

@@ -1,0 +1,80 @@
+"""How the outer views of a Lytro Illum lose colour against the inner ones.
+
+Light strays between neighbouring pixels under a microlens, which lie behind filters of other colours: the farther out a view,
+the more. In an ESLF, as Lytro's own software stores it, the corners of the middle 8 x 8 views have all of it, those of the
+middle n x n have (n - 1)^2 / 7^2 of it (docs/evaluation.md). Four corners, which are all alike, do not show it; but that a
+light field is one of these can be told. The readers of files say so (LightField.paleness), lfcore.camera_colours takes it off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from lfcore.lightfield import FloatArray, LightField, as_float
+
+# Colours of a corner view by those of the middle, rows red, green, blue: the mean over the four corners of train/IMG_0288, an
+# ESLF of an Illum; toolboxes' decodings (train/toys) have about a fifth of it, rendered light fields none.
+_PALE = np.array([[0.910, 0.078, 0.005], [0.023, 0.939, 0.019], [0.037, 0.072, 0.880]], np.float32)
+
+# View sizes that Lytro's own tools write, width by height.
+CAMERA_SIZES = frozenset({(541, 376), (541, 375), (540, 375), (540, 376)})
+# Pictures whose median is darker than this share of white were most likely stored without gamma.
+LINEAR_MEDIAN = 0.16
+_WHOLE = 7  # views from corner to corner of the middle of an ESLF to whose corners the matrix belongs
+_FEWEST = 4  # of fewer, one cannot tell whether some between them were left out; and then there is little of it
+
+
+def outwardness(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """0 in the middle of the grid of views, 1 at its corners: where paleness is 0, and as much as it gets."""
+    return 2 * ((np.asarray(u, np.float64) - 0.5) ** 2 + (np.asarray(v, np.float64) - 0.5) ** 2)
+
+
+def mixing(paleness: npt.ArrayLike) -> FloatArray:
+    """(...) paleness, 1 = that of an Illum's corner view -> (..., 3, 3), stored colours by true ones."""
+    identity = np.eye(3, dtype=np.float32)
+    mixed: FloatArray = (identity + np.asarray(paleness, np.float32)[..., None, None] * (_PALE - identity)).astype(np.float32)
+    return mixed
+
+
+def paleness_of_eslf(steps: int) -> float:
+    """That of the corners of an ESLF's middle views, `steps` from corner to corner; of more than 8 x 8 as of these, for it
+    was not measured farther out."""
+    return min(steps / _WHOLE, 1.0) ** 2
+
+
+def paleness_of_views(corners: npt.NDArray[np.generic], steps: tuple[int, int]) -> float:
+    """That of views whose origin is not said: 0, unless they are most likely those of an ESLF, by how many rows and columns
+    they are apart, by their size, and as they are stored without gamma.
+
+    corners: the corner views (4, H, W, 3), as stored; steps: rows and columns from corner to corner of the grid that they were
+    taken from.
+    """
+    height, width = corners.shape[1:3]
+    apart = steps[0]
+    if steps[1] != apart or not _FEWEST <= apart <= _WHOLE or not {(width, height), (height, width)} & CAMERA_SIZES:
+        return 0.0
+    return paleness_of_eslf(apart) if seems_linear(as_float(corners[:, ::4, ::4])) else 0.0
+
+
+def paleness_of_part(light_field: LightField, steps: int) -> float:
+    """That of the corners of a part in the middle of a grid, `steps` rows of it from corner to corner."""
+    return light_field.paleness * (steps / (light_field.rows - 1)) ** 2
+
+
+def seems_linear(pictures: FloatArray) -> bool:
+    """Whether stored values, 1 = white, are so dark that they are most likely linear light."""
+    return float(np.median(pictures)) < LINEAR_MEDIAN
+
+
+def with_true_colours(light_field: LightField) -> LightField:
+    """All views of a light field as they would be without paleness, float32 from 0; the same where there is none."""
+    if light_field.paleness == 0:
+        return light_field
+    views = np.empty(light_field.views.shape, np.float32)
+    for row, column in np.ndindex(light_field.rows, light_field.columns):
+        paleness = light_field.paleness * outwardness(*light_field.position(row, column))
+        np.matmul(light_field.view(row, column), np.linalg.inv(mixing(paleness)).T, out=views[row, column])
+    return replace(light_field, views=np.maximum(views, 0, out=views), paleness=0.0)
