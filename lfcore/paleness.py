@@ -21,8 +21,7 @@ _PALE = np.array([[0.910, 0.078, 0.005], [0.023, 0.939, 0.019], [0.037, 0.072, 0
 
 # View sizes that Lytro's own tools write, width by height.
 CAMERA_SIZES = frozenset({(541, 376), (541, 375), (540, 375), (540, 376)})
-# Pictures whose median is darker than this share of white were most likely stored without gamma.
-LINEAR_MEDIAN = 0.16
+_BRIGHTEST = 0.3  # median of its corner views: an ESLF holds linear light, and what has a display's tone is brighter
 _WHOLE = 7  # views from corner to corner of the middle of an ESLF to whose corners the matrix belongs
 _FEWEST = 4  # of fewer, one cannot tell whether some between them were left out; and then there is little of it
 
@@ -39,15 +38,9 @@ def mixing(paleness: npt.ArrayLike) -> FloatArray:
     return mixed
 
 
-def paleness_of_eslf(steps: int) -> float:
-    """That of the corners of an ESLF's middle views, `steps` from corner to corner; of more than 8 x 8 as of these, for it
-    was not measured farther out."""
-    return min(steps / _WHOLE, 1.0) ** 2
-
-
 def paleness_of_views(corners: npt.NDArray[np.generic], steps: tuple[int, int]) -> float:
-    """That of views whose origin is not said: 0, unless they are most likely those of an ESLF, by how many rows and columns
-    they are apart, by their size, and as they are stored without gamma.
+    """That of the corners of a grid: 0, unless it is most likely the middle of an ESLF as it is stored, by how many views there
+    are, by their size and by their light.
 
     corners: the corner views (4, H, W, 3), as stored; steps: rows and columns from corner to corner of the grid that they were
     taken from.
@@ -56,17 +49,13 @@ def paleness_of_views(corners: npt.NDArray[np.generic], steps: tuple[int, int]) 
     apart = steps[0]
     if steps[1] != apart or not _FEWEST <= apart <= _WHOLE or not {(width, height), (height, width)} & CAMERA_SIZES:
         return 0.0
-    return paleness_of_eslf(apart) if seems_linear(as_float(corners[:, ::4, ::4])) else 0.0
+    light = float(np.median(as_float(corners[:, ::4, ::4])))
+    return (apart / _WHOLE) ** 2 if light < _BRIGHTEST else 0.0
 
 
 def paleness_of_part(light_field: LightField, steps: int) -> float:
     """That of the corners of a part in the middle of a grid, `steps` rows of it from corner to corner."""
     return light_field.paleness * (steps / (light_field.rows - 1)) ** 2
-
-
-def seems_linear(pictures: FloatArray) -> bool:
-    """Whether stored values, 1 = white, are so dark that they are most likely linear light."""
-    return float(np.median(pictures)) < LINEAR_MEDIAN
 
 
 def with_true_colours(light_field: LightField) -> LightField:

@@ -135,6 +135,15 @@ def test_the_score_in_the_file_is_the_score_one_gets(path: Path, name: str) -> N
     assert score_as_used(name, path) == pytest.approx(weights.training["k16_psnr"]["Buttercup"], abs=0.05)
 
 
+@pytest.mark.parametrize("path", SCENES[1:])
+@pytest.mark.parametrize("name", ["full", "realtime", "planesweep"])
+def test_it_helps_to_know_that_the_corner_views_of_an_eslf_are_pale(path: Path, name: str) -> None:
+    """On a capture that nothing was fitted to."""
+    field = open_light_field(path)
+    assert field.paleness == 1
+    assert score_as_used(name, path) > score(make_synthesizer(name), dataclasses.replace(field, paleness=0.0)) + 0.2
+
+
 @pytest.mark.parametrize("path", SCENES)
 @pytest.mark.parametrize("multiple", [1, 32])
 def test_tiles_in_bfloat16_keep_the_score_of_the_reference_and_leave_no_seams(

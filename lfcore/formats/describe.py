@@ -6,11 +6,13 @@ import numpy as np
 
 from lfcore.disparity_sign import DisparityCheck, Order, check_disparity
 from lfcore.formats.images import depth_name
-from lfcore.lightfield import FloatArray, LightField
-from lfcore.paleness import seems_linear
+from lfcore.lightfield import LightField
 
 # Disparities beyond this, in px over the full baseline, lie outside the levels of the paper's networks (see lfcore.span).
 _SWEEP_LIMIT = 21.0
+
+# Pictures whose median is darker than this share of white were most likely stored without gamma.
+_LINEAR_MEDIAN = 0.16
 
 
 def describe(light_field: LightField, check: DisparityCheck | None = None) -> dict[str, str]:
@@ -42,11 +44,8 @@ def describe(light_field: LightField, check: DisparityCheck | None = None) -> di
 
 def median_level(light_field: LightField) -> float:
     """Median stored value of the centre view, as a share of white."""
-    return float(np.median(_middle(light_field)))
-
-
-def _middle(light_field: LightField) -> FloatArray:
-    return light_field.view(light_field.rows // 2, light_field.columns // 2)[::4, ::4]
+    view = light_field.view(light_field.rows // 2, light_field.columns // 2)
+    return float(np.median(view[::4, ::4]))
 
 
 def tone(light_field: LightField) -> str:
@@ -56,7 +55,7 @@ def tone(light_field: LightField) -> str:
         return f"linear light, as float pictures usually are ({level})"
     if light_field.kind == "ESLF":
         return f"as stored in the ESLF, without gamma ({level})"
-    if seems_linear(_middle(light_field)):
+    if median_level(light_field) < _LINEAR_MEDIAN:
         return f"dark, so probably without gamma ({level})"
     return f"probably with gamma applied ({level})"
 

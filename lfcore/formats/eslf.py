@@ -13,7 +13,7 @@ from lfcore.formats.checks import warned_of_white
 from lfcore.formats.dark import find_dark_views, has_dark_corner
 from lfcore.formats.images import Header, Picture, Pixels, check_memory, open_picture, read_header
 from lfcore.lightfield import LightField
-from lfcore.paleness import CAMERA_SIZES, paleness_of_eslf
+from lfcore.paleness import CAMERA_SIZES, paleness_of_views
 
 LENSLET = 14
 
@@ -96,7 +96,7 @@ def read(
         facts=facts,
         warnings=tuple(warnings),
         dark=dark,
-        paleness=paleness_of_eslf(views - 1),
+        paleness=paleness_of_views(sliced[[0, 0, -1, -1], [0, -1, 0, -1]], (views - 1, views - 1)),
     )
     return warned_of_white(light_field)
 

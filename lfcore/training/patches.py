@@ -135,7 +135,7 @@ def _draw_viewpoint(scene: TrainingScene, rng: np.random.Generator) -> tuple[Fra
 def _shares(spacings: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
     """How often sub-grids of each spacing are drawn: mostly the whole grid, whose corners are what the networks will be given.
 
-    It is not only the baseline: outer views are paler than inner ones, and only from the whole grid can that be learnt.
+    It is not only the baseline: outer views differ from inner ones, and only from the whole grid can that be learnt.
     """
     weights = spacings.astype(np.float64) ** 8
     return weights / weights.sum()
