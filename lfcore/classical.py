@@ -16,8 +16,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from lfcore.camera_colours import CameraColours
 from lfcore.errors import InputError
+from lfcore.illum_correction import IllumCorrection
 from lfcore.lightfield import EXTRAPOLATION_LIMIT, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Shifted, Window, luminance, shifted_inputs
 from lfcore.span import disparity_reach
@@ -59,7 +59,7 @@ class PlaneSweepSynthesizer:
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         self._tuning = tuning or Tuning()
-        self._colours = CameraColours()
+        self._correction = IllumCorrection()
         self._corners: Tensor | None = None  # (4, 3, H, W)
         self._toned: Tensor | None = None  # (4, 3, H, W), the root of it, 1 = the brightest tone
         self._brightest = 1.0
@@ -72,8 +72,8 @@ class PlaneSweepSynthesizer:
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer: the root tone, in which noise is even, and the range of disparities are found here."""
-        self._colours = CameraColours(light_field.paleness)
-        self._corners = self._colours.true(corner_tensor(light_field))
+        self._correction = IllumCorrection(light_field.aperture)
+        self._corners = self._correction.true(corner_tensor(light_field))
         with torch.inference_mode():
             self._brightest = brightest_tone(self._corners)
             self._toned = _toned(self._corners, self._brightest)
@@ -100,13 +100,13 @@ class PlaneSweepSynthesizer:
             for rows, source in _bands(height, width, self._context):
                 scene = _Scene(self._toned[:, :, source], offsets, self._levels, self._tuning)
                 found = scene.disparity(clock, cancelled)
-                parts = scene.blended(self._corners[:, :, source], self._brightest, found)
+                parts = scene.blended(self._corners[:, :, source], self._brightest, found, self._correction.moves(u, v))
                 inside = slice(rows.start - source.start, rows.stop - source.start)
                 disparity[rows] = found[inside]
                 image[:, rows], warped[:, :, rows] = parts[0][:, inside], parts[1][:, :, inside]
                 clock.lap("colour")
-        seen = self._colours.stored(picture(image.clamp_(0, 1)), u, v)
-        inputs = self._colours.stored_of_corners(picture(warped))
+        seen = self._correction.stored(picture(image.clamp_(0, 1)), u, v)
+        inputs = self._correction.stored_of_corners(picture(warped))
         return Synthesis(u, v, self.name, seen, disparity.numpy(), inputs, clock.timings())
 
     @property
@@ -145,9 +145,12 @@ class _Scene:
         clock.lap("disparity")
         return (smooth[0, 0] / smooth[1, 0].clamp(min=1e-3)).clamp(self._levels.low, self._levels.high)
 
-    def blended(self, corners: Tensor, brightest: float, disparity: Tensor) -> tuple[Tensor, Tensor]:
-        """The novel view (3, h, w) of the corners as stored, and the warped inputs (4, 3, h, w), 0 outside of them."""
-        warped = self._warped(corners, disparity)
+    def blended(
+        self, corners: Tensor, brightest: float, disparity: Tensor, moves: tuple[float, float]
+    ) -> tuple[Tensor, Tensor]:
+        """The novel view (3, h, w) of the corners, sampled so many px farther on along x and y, and the warped inputs (4, 3, h,
+        w), 0 outside of them."""
+        warped = self._warped(corners, disparity, moves)
         weights = self._weights(_toned(warped, brightest), disparity)  # (4, 1, h, w)
         return (warped * weights).sum(0), warped * self._inside(disparity)
 
@@ -156,11 +159,11 @@ class _Scene:
         warped = self._warped(luminance(self._toned).unsqueeze(1), disparity)
         return (warped * self._weights(warped, disparity)).sum(0, keepdim=True)
 
-    def _warped(self, inputs: Tensor, disparity: Tensor) -> Tensor:
+    def _warped(self, inputs: Tensor, disparity: Tensor, moves: tuple[float, float] = (0, 0)) -> Tensor:
         """The inputs (4, C, h, w) warped; beyond its edge each is continued by the edge, for places that no input sees."""
         reach = math.ceil(self._levels.reach * float(self._offsets.abs().max())) + 1
         padded = F.pad(inputs, (reach,) * 4, mode="replicate")
-        return backward_warp(padded, disparity.expand(4, 1, -1, -1), self._offsets, (reach, reach))
+        return backward_warp(padded, disparity.expand(4, 1, -1, -1), self._offsets, (reach + moves[1], reach + moves[0]))
 
     def _weights(self, toned: Tensor, disparity: Tensor) -> Tensor:
         """Weights of the warped inputs (4, C, h, w), their sum 1: more for near ones, less for those that disagree."""

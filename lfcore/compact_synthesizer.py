@@ -10,11 +10,11 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
-from lfcore.camera_colours import CameraColours
 from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.compact_inference import Coloured, CompactInference
 from lfcore.compact_parts import Gathered, Places, full_size, phases_of
 from lfcore.errors import InputError
+from lfcore.illum_correction import IllumCorrection
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.planesweep import Levels, Window, deviation_sweep, luminance
 from lfcore.span import Span, continued_by_others, made_larger, made_smaller, span_of
@@ -54,7 +54,7 @@ class CompactSynthesizer:
         self.dtype = tuning.dtype
         self._networks = CompactInference(model, tuning)
         self._size = 0, 0
-        self._colours = CameraColours()
+        self._correction = IllumCorrection()
         self._span = Span()
         self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
         self._corners: Tensor | None = None  # prepared for the warp
@@ -62,8 +62,8 @@ class CompactSynthesizer:
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
-        self._colours = CameraColours(light_field.paleness)
-        corners = self._colours.true(corner_tensor(light_field))
+        self._correction = IllumCorrection(light_field.aperture)
+        corners = self._correction.true(corner_tensor(light_field))
         self._size = light_field.height, light_field.width
         self._span = span = span_of(corners, self.config.levels)
         self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
@@ -83,8 +83,8 @@ class CompactSynthesizer:
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         synthesis, gathered, _ = self._computed(u, v, cancelled)
-        colours = self._colours
-        return synthesis.with_warped(lambda: colours.stored_of_corners(self._picture_of_warped(gathered)))
+        correction = self._correction
+        return synthesis.with_warped(lambda: correction.stored_of_corners(self._picture_of_warped(gathered)))
 
     def synthesize_weighed(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         """See WeighingSynthesizer; it is put together without the warped inputs."""
@@ -109,7 +109,8 @@ class CompactSynthesizer:
             disparity = self._as_large(self._networks.disparity(deviations))  # (4, h, w), phases, px of the network
             clock.lap("disparity")
             check_cancelled(cancelled)
-            places = Places(self._span.scale * offsets, self._span.shift * offsets, self._edge)
+            moves = self._span.shift * offsets + torch.tensor(self._correction.moves(u, v))
+            places = Places(self._span.scale * offsets, moves, self._edge)
             gathered = self._networks.warp(self._corners, disparity, places, (u, v))
             clock.lap("warp")
             check_cancelled(cancelled)
@@ -117,7 +118,7 @@ class CompactSynthesizer:
             clock.lap("colour")
             height, width = self._size
             whole = self._span.disparity(full_size(disparity)[:height, :width].contiguous()).numpy()
-            image = self._colours.stored(coloured.image.numpy(), u, v)
+            image = self._correction.stored(coloured.image.numpy(), u, v)
             synthesis = LateSynthesis(u, v, self.name, image, whole, None, clock.timings())
         return synthesis, gathered, coloured
 

@@ -29,8 +29,9 @@ class LightField:
 
     `views` is (V, U, H, W, 3), uint8 or uint16 as stored in the file, or float32 in units where 1 is white. Row v grows
     downwards, column u to the right; captured view (row, column) sits at u = column / (U - 1), v = row / (V - 1), so that
-    the four corner views span [0, 1]^2. `dark` names the views too dark to be used (outer views of an Illum). `paleness` says
-    how much colour the corner views have lost against the middle, in the unit of lfcore.paleness; 0 where that is not known.
+    the four corner views span [0, 1]^2. `dark` names the views too dark to be used (outer views of an Illum). `aperture`: how
+    much of an Illum's aperture the grid spans, 1 = the middle 8 x 8 views of its ESLF; 0 where it is not known to be of one
+    (lfcore.illum).
     """
 
     views: npt.NDArray[np.generic]  # (V, U, H, W, 3)
@@ -40,7 +41,7 @@ class LightField:
     facts: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     dark: frozenset[tuple[int, int]] = frozenset()
-    paleness: float = 0.0
+    aperture: float = 0.0
 
     def __post_init__(self) -> None:
         if self.views.ndim != 5 or self.views.shape[-1] != 3:
@@ -99,9 +100,9 @@ class LightField:
 
     @cached_property
     def content_key(self) -> str:
-        """Hex digest of the pixels, their arrangement and their paleness: all that a synthesis depends on, whatever file it
+        """Hex digest of the pixels, their arrangement and their aperture: all that a synthesis depends on, whatever file it
         came from."""
-        described = (self.views.shape, str(self.views.dtype), self.paleness)
+        described = (self.views.shape, str(self.views.dtype), self.aperture)
         digest = hashlib.blake2b(repr(described).encode(), digest_size=16)
         for row in self.views:
             digest.update(np.ascontiguousarray(row).data)

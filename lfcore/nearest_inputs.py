@@ -16,8 +16,8 @@ import numpy as np
 
 from lfcore.coarse_colours import CoarseColours
 from lfcore.errors import InputError
+from lfcore.illum import aperture_of_part
 from lfcore.lightfield import EXTRAPOLATION_LIMIT, FloatArray, LightField, check_viewpoint
-from lfcore.paleness import paleness_of_part
 from lfcore.synthesis import LateSynthesis, Synthesis, Synthesizer, WeighingSynthesizer, never, weighs
 
 NEIGHBOURS = "neighbours"
@@ -46,8 +46,7 @@ class Cell:
     def of(self, light_field: LightField) -> LightField:
         """The four views as a light field of their own; it shares the memory of the whole."""
         views = light_field.views[self.row :: self.rows, self.column :: self.columns][:2, :2]
-        paleness = paleness_of_part(light_field, self.rows)
-        return replace(light_field, views=views, dark=frozenset(), paleness=paleness)
+        return replace(light_field, views=views, dark=frozenset(), aperture=aperture_of_part(light_field, self.rows))
 
     def within(self, light_field: LightField, u: float, v: float) -> tuple[float, float]:
         """(u, v) of the whole in units of the cell: from 0 to 1 between its views."""

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor
 
 from lfcore.allocator import keep_freed_memory
-from lfcore.camera_colours import CameraColours
 from lfcore.errors import InputError
 from lfcore.fewer_means import kept_levels, with_fewer_means
+from lfcore.illum_correction import IllumCorrection
 from lfcore.lightfield import FloatArray, LightField, check_viewpoint
 from lfcore.networks import BORDER, FullModel, colour_features, sweep_luminance
 from lfcore.planesweep import Window, sparse_sweep
@@ -55,7 +55,7 @@ class NetworkSynthesizer:
         self._colour = TunedStack(model.colour, self._tuning)
         self._span = Span()
         self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
-        self._colours = CameraColours()
+        self._correction = IllumCorrection()
         self._corners: Tensor | None = None  # (4, 3, H, W)
         self._continued: Tensor | None = None  # (4, 3, H + 2 edge, W + 2 edge)
         self._luma: Tensor | None = None  # (4, 1, h + 2 edge, w + 2 edge), what is swept; made smaller where the span says so
@@ -68,8 +68,8 @@ class NetworkSynthesizer:
 
     def set_light_field(self, light_field: LightField) -> None:
         """See Synthesizer."""
-        self._colours = CameraColours(light_field.paleness)
-        self._corners = corners = self._colours.true(corner_tensor(light_field))
+        self._correction = IllumCorrection(light_field.aperture)
+        self._corners = corners = self._correction.true(corner_tensor(light_field))
         self._span = span = span_of(corners, self.config.levels)
         self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
         self._continued = swept = continued_by_others(corners, self._edge, span.shift)
@@ -81,7 +81,7 @@ class NetworkSynthesizer:
         if self._corners is None or self._continued is None or self._luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
-        corners, span, colours = self._corners, self._span, self._colours
+        corners, span, correction = self._corners, self._span, self._correction
         height, width = corners.shape[2:]
         offsets = corner_offsets(u, v)
         clock, check = Clock(), partial(check_cancelled, cancelled)
@@ -90,16 +90,17 @@ class NetworkSynthesizer:
             found = self._found(self._luma, offsets, clock, check)  # (1, 1, *wide), px of the network
             check()
             wide, disparity, inside = found.shape[2:], span.disparity(found), self._edge - BORDER
-            warped = backward_warp(self._continued, disparity, offsets, (inside, inside))  # (4, 3, *wide)
+            x, y = correction.moves(u, v)
+            warped = backward_warp(self._continued, disparity, offsets, (inside + y, inside + x))  # (4, 3, *wide)
             h = colour_features(found, warped.view(1, 12, *wide), torch.tensor([[u, v]]))  # (1, 15, *wide)
             clock.lap("warp")
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._colour(self._colour.tile_input(h, tile), check))
             clock.lap("colour")
             own = disparity[:, :, BORDER:-BORDER, BORDER:-BORDER].contiguous()
-        seen = colours.stored(picture(image[0].clamp_(0, 1)), u, v)
+        seen = correction.stored(picture(image[0].clamp_(0, 1)), u, v)
         synthesis = LateSynthesis(u, v, self.name, seen, own[0, 0].numpy(), None, clock.timings())
-        return synthesis.with_warped(lambda: colours.stored_of_corners(_warped(corners, own, offsets)))
+        return synthesis.with_warped(lambda: correction.stored_of_corners(_warped(corners, own, offsets, (y, x))))
 
     def _found(self, luma: Tensor, offsets: Tensor, clock: Clock, check: Callable[[], None]) -> Tensor:
         """What the disparity network finds, (1, 1, H + 2 BORDER, W + 2 BORDER): as far as the colour network sees."""
@@ -128,7 +129,7 @@ class NetworkSynthesizer:
         return large[:, :, beyond : beyond + height + 2 * BORDER, beyond : beyond + width + 2 * BORDER].contiguous()
 
 
-def _warped(corners: Tensor, disparity: Tensor, offsets: Tensor) -> FloatArray:
+def _warped(corners: Tensor, disparity: Tensor, offsets: Tensor, origin: tuple[float, float]) -> FloatArray:
     """The warped inputs as they are shown, 0 where they have no sample: (4, H, W, 3)."""
     with torch.inference_mode():
-        return picture(backward_warp(corners, disparity, offsets))
+        return picture(backward_warp(corners, disparity, offsets, origin))

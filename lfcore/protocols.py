@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from lfcore.errors import InputError
+from lfcore.illum import aperture_of_part
 from lfcore.lightfield import CORNERS, FloatArray, LightField
 from lfcore.metrics import Score, channel_score, k16, k16_view, luma_score
-from lfcore.paleness import paleness_of_part
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Protocol:
             light_field,
             views=light_field.views[top : top + side, left : left + side],
             dark=frozenset((row, column) for row, column in dark if 0 <= row < side and 0 <= column < side),
-            paleness=paleness_of_part(light_field, side - 1),
+            aperture=aperture_of_part(light_field, side - 1),
         )
 
     def views(self, grid: LightField) -> list[tuple[int, int]]:

@@ -170,7 +170,7 @@ class SynthesisProcess:
         self._exchange = Exchange(memory, shape, dtype)
         for corner, (u, v) in zip(self._exchange.corners, CORNERS, strict=True):
             np.copyto(corner, light_field.views[-int(v), -int(u)])
-        self._ask(Take(memory.name, shape, str(dtype), light_field.paleness), Taken)
+        self._ask(Take(memory.name, shape, str(dtype), light_field.aperture), Taken)
         self._light_field = light_field
         return self._exchange
 

@@ -33,7 +33,7 @@ class Take:
     memory: str
     shape: tuple[int, int]  # (H, W)
     dtype: str
-    paleness: float  # of the corner views
+    aperture: float  # see LightField
 
 
 @dataclass(frozen=True)

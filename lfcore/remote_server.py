@@ -118,7 +118,7 @@ class _Server:
         exchange = Exchange(SharedMemory(request.memory), request.shape, request.dtype)
         # The results of queries will take their place; in the order of CORNERS, columns of the grid come first.
         views = exchange.corners.copy().reshape(2, 2, *request.shape, 3).swapaxes(0, 1)
-        self._light_field = LightField(np.ascontiguousarray(views), "handed over", "", "", paleness=request.paleness)
+        self._light_field = LightField(np.ascontiguousarray(views), "handed over", "", "", aperture=request.aperture)
         self._exchange = exchange
 
     def _synthesize(self, request: Synthesize) -> Finished:

@@ -8,8 +8,8 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from lfcore.camera_colours import CameraColours
 from lfcore.errors import InputError
+from lfcore.illum_correction import IllumCorrection
 from lfcore.lightfield import LightField, check_viewpoint
 from lfcore.networks import BORDER, SingleModel, single_features
 from lfcore.synthesizer import Clock, Synthesis, check_cancelled, continued, corner_tensor, never, picture, put
@@ -26,7 +26,7 @@ class SingleSynthesizer:
         self.config = model.config
         self._tuning = tuning or machine_tuning()
         self._stack = TunedStack(model.colour, self._tuning)
-        self._colours = CameraColours()
+        self._correction = IllumCorrection()
         self._inputs: Tensor | None = None  # (1, 12, H + 2 BORDER, W + 2 BORDER), continued beyond their edges
 
     @property
@@ -35,8 +35,8 @@ class SingleSynthesizer:
         return self._tuning.dtype
 
     def set_light_field(self, light_field: LightField) -> None:
-        self._colours = CameraColours(light_field.paleness)
-        self._inputs = continued(self._colours.true(corner_tensor(light_field)), BORDER).flatten(0, 1).unsqueeze(0)
+        self._correction = IllumCorrection(light_field.aperture)
+        self._inputs = continued(self._correction.true(corner_tensor(light_field)), BORDER).flatten(0, 1).unsqueeze(0)
 
     def synthesize(self, u: float, v: float, cancelled: Callable[[], bool] = never) -> Synthesis:
         if self._inputs is None:
@@ -50,5 +50,5 @@ class SingleSynthesizer:
             for tile in self._tuning.tiles(height, width):
                 put(image, tile.window, self._stack(self._stack.tile_input(features, tile), check))
             clock.lap("colour")
-        seen = self._colours.stored(picture(image[0].clamp_(0, 1)), u, v)
+        seen = self._correction.stored(picture(image[0].clamp_(0, 1)), u, v)
         return Synthesis(u, v, self.name, seen, None, None, clock.timings())

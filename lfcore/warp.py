@@ -37,12 +37,13 @@ def source_offset(input_position: Tensor, novel_position: Tensor) -> Tensor:
     return input_position - novel_position
 
 
-def backward_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[int, int] = (0, 0)) -> Tensor:
+def backward_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[float, float] = (0, 0)) -> Tensor:
     """Sample `image` at s + (p_i - q) D(s), differentiable in the disparity (paper, Eq. 3).
 
     image: (N, C, H, W) float32. disparity: (N or 1, 1, h, w) float32, px over the full baseline; one map may serve all images.
     offset: (N, 2) = p_i - q. origin: (y, x) in `image` of the disparity map's first pixel, where the map covers only a part of
-    the image. Returns (N, C, h, w) float32; what falls outside the picture is 0, as in the authors' code.
+    the image or lies between its pixels. Returns (N, C, h, w) float32; what falls outside the picture is 0, as in the authors'
+    code.
     """
     _, _, height, width = image.shape
     x, y = _positions(disparity, offset, origin)
@@ -52,7 +53,7 @@ def backward_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tupl
     return torch.where(inside.unsqueeze(1), _cubic_sample(image, x, y), 0)
 
 
-def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[int, int] = (0, 0)) -> Tensor:
+def quick_warp(image: Tensor, disparity: Tensor, offset: Tensor, origin: tuple[float, float] = (0, 0)) -> Tensor:
     """The same warp by torch's own bicubic sampling: twice as fast, with a sharper kernel (a = -0.75).
 
     For models trained with it, not for the paper's. Arguments as for `backward_warp`. What falls outside
@@ -70,7 +71,7 @@ def quick_sample(image: Tensor, x: Tensor, y: Tensor) -> Tensor:
     return F.grid_sample(image, grid, mode="bicubic", padding_mode="border", align_corners=True)
 
 
-def _positions(disparity: Tensor, offset: Tensor, origin: tuple[int, int]) -> tuple[Tensor, Tensor]:
+def _positions(disparity: Tensor, offset: Tensor, origin: tuple[float, float]) -> tuple[Tensor, Tensor]:
     """Where to sample, x and y, px: both (N, h, w)."""
     h, w = disparity.shape[-2:]
     n = offset.shape[0]

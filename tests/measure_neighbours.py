@@ -14,10 +14,10 @@ import numpy as np
 
 from lfcore.errors import InputError
 from lfcore.formats import open_light_field
+from lfcore.illum import aperture_of_part
 from lfcore.lightfield import FloatArray, LightField
 from lfcore.metrics import k16
 from lfcore.nearest_inputs import NEIGHBOURS
-from lfcore.paleness import paleness_of_part
 from lfcore.synthesizer import make_synthesizer
 
 _LEAST = 6  # views each way, of which three are kept
@@ -33,7 +33,7 @@ def without_middle(field: LightField) -> tuple[LightField, tuple[float, float], 
     row, column = field.rows // 2, field.columns // 2
     first = (row + 1) % 2, (column + 1) % 2
     views = np.ascontiguousarray(field.views[first[0] :: 2, first[1] :: 2])
-    kept = replace(field, views=views, dark=frozenset(), paleness=paleness_of_part(field, 2 * (len(views) - 1)))
+    kept = replace(field, views=views, dark=frozenset(), aperture=aperture_of_part(field, 2 * (len(views) - 1)))
     u, v = (column - first[1]) / 2 / (kept.columns - 1), (row - first[0]) / 2 / (kept.rows - 1)
     return kept, (u, v), field.view(row, column)
 

@@ -356,14 +356,14 @@ def test_a_shipped_model_gives_the_same_there_and_here() -> None:
 
 
 def test_how_pale_corners_are_is_known_there_too() -> None:
-    field = replace(light_field(), paleness=1.0)
+    field = replace(light_field(), aperture=1.0)
     here = make_synthesizer("planesweep")
     here.set_light_field(field)
     expected = here.synthesize(0.5, 0.5).image
     with SynthesisProcess() as process:
         process.start()
         np.testing.assert_allclose(asked(process, "planesweep", field).image, expected, atol=1e-4)
-        told_nothing = asked(process, "planesweep", replace(field, paleness=0.0)).image
+        told_nothing = asked(process, "planesweep", replace(field, aperture=0.0)).image
     assert np.abs(told_nothing - expected).max() > 1e-2
 
 

@@ -17,8 +17,8 @@ from lfcore.formats.array_files import StoredArray, stored_arrays
 from lfcore.formats.checks import put_in_order, without_non_finite
 from lfcore.formats.dark import find_dark_views, has_dark_corner
 from lfcore.formats.images import MAX_BYTES, Pixels
+from lfcore.illum import aperture_of_views
 from lfcore.lightfield import LightField
-from lfcore.paleness import paleness_of_views
 
 KIND = "array of views"
 
@@ -94,9 +94,9 @@ def read(
     taken = np.array(np.broadcast_to(stored[..., :3], (*stored.shape[:4], 3)), order="C")
     bad = sum(without_non_finite(view) for row in taken for view in row)
     warnings = (f"{bad} values that are no finite numbers were set to 0.",) if bad else ()
-    paleness = paleness_of_views(taken[[0, 0, -1, -1], [0, -1, 0, -1]], (taken.shape[0] - 1, taken.shape[1] - 1))
+    aperture = aperture_of_views(taken[[0, 0, -1, -1], [0, -1, 0, -1]], (taken.shape[0] - 1, taken.shape[1] - 1))
     light_field = LightField(
-        views=taken, name=path.stem, source=str(path), kind=KIND, facts=facts, warnings=warnings, dark=dark, paleness=paleness
+        views=taken, name=path.stem, source=str(path), kind=KIND, facts=facts, warnings=warnings, dark=dark, aperture=aperture
     )
     return put_in_order(light_field)
 

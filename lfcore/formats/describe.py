@@ -28,10 +28,10 @@ def describe(light_field: LightField, check: DisparityCheck | None = None) -> di
         "Disparity": _disparity(light_field, check),
         "Order of views": check.sentence,
     }
-    if light_field.paleness:
+    if light_field.aperture:
         facts["Colours"] = (
             "outer views of an Illum's ESLF are paler than inner ones; syntheses take that into account "
-            f"({light_field.paleness:.0%} of what the corners of the middle 8 x 8 have)"
+            f"({light_field.aperture**2:.0%} of what the corners of the middle 8 x 8 have)"
         )
     if light_field.dark:
         facts["Dark views"] = f"{len(light_field.dark)} of {light_field.rows * light_field.columns}: {_dark(light_field)}"

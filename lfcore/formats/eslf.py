@@ -12,8 +12,8 @@ from lfcore.errors import Cancelled, InputError
 from lfcore.formats.checks import warned_of_white
 from lfcore.formats.dark import find_dark_views, has_dark_corner
 from lfcore.formats.images import Header, Picture, Pixels, check_memory, open_picture, read_header
+from lfcore.illum import CAMERA_SIZES, aperture_of_views
 from lfcore.lightfield import LightField
-from lfcore.paleness import CAMERA_SIZES, paleness_of_views
 
 LENSLET = 14
 
@@ -96,7 +96,7 @@ def read(
         facts=facts,
         warnings=tuple(warnings),
         dark=dark,
-        paleness=paleness_of_views(sliced[[0, 0, -1, -1], [0, -1, 0, -1]], (views - 1, views - 1)),
+        aperture=aperture_of_views(sliced[[0, 0, -1, -1], [0, -1, 0, -1]], (views - 1, views - 1)),
     )
     return warned_of_white(light_field)
 

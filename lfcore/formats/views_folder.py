@@ -15,8 +15,8 @@ from lfcore.formats.checks import put_in_order, with_warnings, without_non_finit
 from lfcore.formats.dark import find_dark_views
 from lfcore.formats.images import EXTENSIONS, Header, Pixels, check_memory, open_picture, read_header
 from lfcore.formats.names import GANTRY, RULES, Grid, belongs_to_grid, find_grid
+from lfcore.illum import aperture_of_views
 from lfcore.lightfield import LightField
-from lfcore.paleness import paleness_of_views
 
 # More threads than this gain nothing: the decoders wait for memory by then.
 _MAX_THREADS = 8
@@ -66,7 +66,7 @@ def read(
         facts=facts,
         warnings=tuple(warnings),
         dark=find_dark_views(views),
-        paleness=paleness_of_views(views[[0, 0, -1, -1], [0, -1, 0, -1]], grid.steps),
+        aperture=aperture_of_views(views[[0, 0, -1, -1], [0, -1, 0, -1]], grid.steps),
     )
     # A gantry's columns are in the order of the camera's x, so where one axis is reversed it must be the rows.
     return put_in_order(light_field) if grid.kind == GANTRY else with_warnings(light_field)

@@ -25,10 +25,10 @@ from lfcore.compact import CompactModel
 from lfcore.disparity_sign import baselines_differ, check_disparity
 from lfcore.errors import InputError
 from lfcore.export import write_picture
+from lfcore.illum import with_true_colours
 from lfcore.lightfield import LightField
 from lfcore.metrics import check_size, k16, k16_view
 from lfcore.models import Model
-from lfcore.paleness import with_true_colours
 from lfcore.planesweep import Levels, Window, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets, corner_tensor, synthesizer_of
 from lfcore.training.architectures import Batch, architecture

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
+from lfcore.illum import mixing
 from lfcore.lightfield import FloatArray
-from lfcore.paleness import mixing
 
 Range = tuple[float, float]
 
@@ -27,7 +27,7 @@ class CameraConfig:
     wandering: Range = (0.0, 0.012)  # deviation of each view's (u, v), in baselines
     gain_deviation: Range = (0.0, 0.015)  # of the views' brightness, relative
     tint_deviation: Range = (0.0, 0.008)  # of the views' red, green and blue, relative
-    # How far the corner views lose colour, see lfcore.paleness, where that of an ESLF has been taken off: as toolboxes decode.
+    # How far the corner views lose colour, see lfcore.illum, where that of an ESLF has been taken off: as toolboxes decode.
     paleness: Range = (0.0, 0.4)
     # How much darker the corner views are. Around 0, as in decoded captures: with 0 to 0.12 the networks learnt to brighten
     # every picture by 4%, which cost half a decibel.
