@@ -102,8 +102,9 @@ class LightField:
     def content_key(self) -> str:
         """Hex digest of the pixels, their arrangement and their aperture: all that a synthesis depends on, whatever file it
         came from."""
-        described = (self.views.shape, str(self.views.dtype), self.aperture)
-        digest = hashlib.blake2b(repr(described).encode(), digest_size=16)
+        digest = hashlib.blake2b(repr((self.views.shape, str(self.views.dtype))).encode(), digest_size=16)
+        if self.aperture:
+            digest.update(repr(self.aperture).encode())
         for row in self.views:
             digest.update(np.ascontiguousarray(row).data)
         return digest.hexdigest()
