@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from lfcore.illum import displacement, mixing, outwardness
 from lfcore.lightfield import FloatArray
+
+_BURNT = 0.98  # from here on to 1 the least of the three colours tells of a place that is
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class IllumCorrection:
     def _mixed(self, pictures: FloatArray, paleness: float) -> FloatArray:
         if paleness == 0:
             return pictures
-        flat = torch.from_numpy(pictures).flatten(0, -2) @ torch.from_numpy(np.ascontiguousarray(mixing(paleness).T))
-        mixed: FloatArray = flat.view(pictures.shape).numpy()
+        matrix, given = torch.from_numpy(mixing(paleness)), torch.from_numpy(pictures).flatten(0, -2)  # (N, 3)
+        # What is burnt out stays white: how bright it was, so that the camera's white would come of it, is not known.
+        burnt = ((given.amin(1, keepdim=True) - _BURNT) / (1 - _BURNT)).clamp(0, 1)
+        mixed: FloatArray = torch.addmm(burnt * (1 - matrix.sum(1)), given, matrix.T).view(pictures.shape).numpy()
         return mixed

@@ -110,6 +110,16 @@ def test_what_is_taken_off_a_corner_is_given_back_there() -> None:
     assert np.array_equal(correction.stored(true[0], 0.5, 0.5), true[0])
 
 
+def test_what_is_burnt_out_stays_white() -> None:
+    correction, white = IllumCorrection(1.0), np.ones((2, 3, 3), np.float32)
+    true = correction.true(torch.ones(4, 3, 2, 3)).clamp(max=1).permute(0, 2, 3, 1).contiguous().numpy()
+    for u, v in (*CORNERS, (0.3, 0.9), (0.5, 0.5)):
+        np.testing.assert_allclose(correction.stored(true[0], u, v), white, atol=1e-6)
+    np.testing.assert_allclose(correction.stored_of_corners(true), np.ones((4, 2, 3, 3)), atol=1e-6)
+    yellow = np.full((1, 1, 3), (1, 1, 0.3), np.float32)
+    assert correction.stored(yellow, 0, 0)[0, 0, 2] > 0.35  # not burnt out: it is paler there
+
+
 def test_of_other_light_fields_nothing_is_touched() -> None:
     pictures, image = torch.rand(4, 3, 5, 6), np.ones((5, 6, 3), np.float32)
     assert IllumCorrection().true(pictures) is pictures
