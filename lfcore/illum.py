@@ -50,18 +50,18 @@ def displacement(aperture: float, u: float, v: float) -> tuple[float, float]:
     return scale * x, scale * y
 
 
-def aperture_of_views(corners: npt.NDArray[np.generic], steps: tuple[int, int]) -> float:
+def aperture_of_views(views: npt.NDArray[np.generic], steps: tuple[int, int] | None = None) -> float:
     """LightField.aperture of a grid: 0, unless it is most likely the middle of an ESLF as it is stored, by how many views there
     are, by their size and by their light.
 
-    corners: the corner views (4, H, W, 3), as stored; steps: rows and columns from corner to corner of the grid that they were
-    taken from.
+    views: (V, U, H, W, 3), as stored; steps: rows and columns from corner to corner of the grid that they were taken from,
+    where some were left out.
     """
-    height, width = corners.shape[1:3]
-    apart = steps[0]
-    if steps[1] != apart or not _FEWEST <= apart <= _WHOLE or not {(width, height), (height, width)} & CAMERA_SIZES:
+    rows, columns, height, width, _ = views.shape
+    apart, across = steps or (rows - 1, columns - 1)
+    if across != apart or not _FEWEST <= apart <= _WHOLE or not {(width, height), (height, width)} & CAMERA_SIZES:
         return 0.0
-    light = float(np.median(as_float(corners[:, ::4, ::4])))
+    light = float(np.median(as_float(views[[0, 0, -1, -1], [0, -1, 0, -1], ::4, ::4])))
     return apart / _WHOLE if light < _BRIGHTEST else 0.0
 
 

@@ -68,7 +68,7 @@ def test_views_between_the_middle_and_the_corners_are_shifted() -> None:
 
 
 def corners(size: tuple[int, int] = ESLF_SIZE, level: float = 0.1) -> FloatArray:
-    return np.full((4, *size, 3), level, np.float32)
+    return np.full((2, 2, *size, 3), level, np.float32)
 
 
 def test_the_part_of_the_aperture_is_that_of_the_views_taken() -> None:

@@ -74,8 +74,17 @@ def test_what_the_typeface_has_asks_for_nothing(imgui_context: Any, searches: li
     assert not more.looking
 
 
-def test_the_window_itself_draws_nothing_that_its_typeface_lacks(viewer: Offscreen, searches: list[Search]) -> None:
-    viewer.settled()  # asking would fail
+def test_the_window_itself_draws_nothing_that_its_typeface_lacks(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    asked: list[bool] = []  # a fault would be a message in the window
+    monkeypatch.setattr(more_fonts, "fonts_of_the_system", lambda: asked.append(True) or ())
+    viewer: Offscreen = request.getfixturevalue("viewer")
+    viewer.settled()
+    assert not asked
+    viewer.interface.controller.say(BOLD_A)
+    viewer.settled()
+    assert asked == [True]
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no font at all" * 1000])

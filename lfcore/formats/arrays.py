@@ -94,9 +94,15 @@ def read(
     taken = np.array(np.broadcast_to(stored[..., :3], (*stored.shape[:4], 3)), order="C")
     bad = sum(without_non_finite(view) for row in taken for view in row)
     warnings = (f"{bad} values that are no finite numbers were set to 0.",) if bad else ()
-    aperture = aperture_of_views(taken[[0, 0, -1, -1], [0, -1, 0, -1]], (taken.shape[0] - 1, taken.shape[1] - 1))
     light_field = LightField(
-        views=taken, name=path.stem, source=str(path), kind=KIND, facts=facts, warnings=warnings, dark=dark, aperture=aperture
+        views=taken,
+        name=path.stem,
+        source=str(path),
+        kind=KIND,
+        facts=facts,
+        warnings=warnings,
+        dark=dark,
+        aperture=aperture_of_views(taken),
     )
     return put_in_order(light_field)
 

@@ -96,7 +96,7 @@ def read(
         facts=facts,
         warnings=tuple(warnings),
         dark=dark,
-        aperture=aperture_of_views(sliced[[0, 0, -1, -1], [0, -1, 0, -1]], (views - 1, views - 1)),
+        aperture=aperture_of_views(sliced),
     )
     return warned_of_white(light_field)
 

@@ -66,7 +66,7 @@ def read(
         facts=facts,
         warnings=tuple(warnings),
         dark=find_dark_views(views),
-        aperture=aperture_of_views(views[[0, 0, -1, -1], [0, -1, 0, -1]], grid.steps),
+        aperture=aperture_of_views(views, grid.steps),
     )
     # A gantry's columns are in the order of the camera's x, so where one axis is reversed it must be the rows.
     return put_in_order(light_field) if grid.kind == GANTRY else with_warnings(light_field)
