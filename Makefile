@@ -71,16 +71,24 @@ clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info
 
 # The program is installed in place, in the versions of constraints.txt; touched last, so that a broken set-up is done again.
-$(VENV)/ready: pyproject.toml constraints.txt $(wildcard lfcore/kernels/*.[ch] app/painting/*.[ch])
-	@$(find_python); \
-	$(make_venv); \
-	echo "Setting up in $(VENV) (once; about 1.3 GB, most of it torch) ..."; \
-	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .; \
-	touch $@
+SOURCES_OF_SETUP := pyproject.toml constraints.txt $(wildcard lfcore/kernels/*.[ch] app/painting/*.[ch])
 
-$(VENV)/ready-for-tests: $(VENV)/ready
-	@$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+$(VENV)/ready: $(SOURCES_OF_SETUP)
+	@$(call install,.)
 	@touch $@
+
+# With what tests need, in one go, for each installation compiles the kernels.
+$(VENV)/ready-for-tests: $(SOURCES_OF_SETUP)
+	@$(call install,.[test])
+	@touch $(VENV)/ready $@
+
+# $(call install,WHAT): into the environment, which is made where there is none.
+define install
+$(find_python); \
+$(make_venv); \
+echo "Setting up in $(VENV) (once; about 1.3 GB, most of it torch) ..."; \
+$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '$(1)'
+endef
 
 define find_python
 python=; \

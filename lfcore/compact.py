@@ -2,9 +2,9 @@
 
 What differs from the paper: the sweep runs at half resolution over fewer levels, and its means are left out, which told nothing
 that the deviations do not; the disparity network looks far (a stride and dilated layers), names a probability for every level,
-starts from the sweep's own minimum, and brings its result to full resolution by learned weights; the colour network works on
-2 x 2 blocks of pixels, weighs the four warped inputs and adds what is missing. Both see pictures in the root tone
-(lfcore.tone), which evens out exposure and noise.
+starts from the sweep's own minimum, and brings its result to full resolution by learned weights; one step without weights moves
+that to where the inputs agree best (lfcore.alignment); the colour network works on 2 x 2 blocks of pixels, weighs the four
+warped inputs and adds what is missing. Both see pictures in the root tone (lfcore.tone), which evens out exposure and noise.
 """
 
 from __future__ import annotations

@@ -103,6 +103,13 @@ class CompactInference:
         """(1, L, h, w) of the sweep, channels_last, to the phases (4, h, w) of the disparity, px."""
         return self._parts.disparity(self._hidden(deviations), deviations)
 
+    def aligned(self, luma: Tensor, disparity: Tensor, places: Places, most: float) -> Tensor:
+        """The phases of a disparity, px as this network counts them, changed by up to `most` to where the inputs agree best.
+
+        luma: (4, H, W), luminance of the corner views in the root tone, continued beyond their edges as `prepared` ones are.
+        """
+        return self._parts.aligned(luma, disparity, places, most)
+
     def _hidden(self, deviations: Tensor) -> Tensor:
         """The disparity network's last hidden channels, (1, C, h, w)."""
         coarse = _residuals(self._stem(deviations), self._blocks)

@@ -15,6 +15,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from lfcore import kernels
+from lfcore.alignment import FLAT, WEIGHTS, alignment_step
 from lfcore.compact import AGREEMENT_REACH
 from lfcore.kernels import PixelMatrix
 from lfcore.neighbourhoods import greatest_around, mean_around
@@ -74,6 +75,10 @@ class Parts(Protocol):
     def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
         """Hidden channels (1, C, h, w), not negative, and the sweep's deviations (1, L, h, w) to phases (4, h, w), px."""
 
+    def aligned(self, luma: Tensor, disparity: Tensor, places: Places, most: float) -> Tensor:
+        """The phases of a disparity, changed by up to `most` px to where the inputs agree best (lfcore.alignment). luma: (4, H,
+        W), luminance of the inputs in the root tone, continued beyond their edges as they are."""
+
     def gathered(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
         """The corners warped by the phases of the disparity; position: as the network takes it."""
 
@@ -125,6 +130,10 @@ class CompiledParts:
     def disparity(self, pixels: Tensor, deviations: Tensor) -> Tensor:
         return kernels.compact_disparity(pixels, deviations, self._score, self._values, self._spread, self._sharpness)
 
+    def aligned(self, luma: Tensor, disparity: Tensor, places: Places, most: float) -> Tensor:
+        where = places.offsets, places.moves, places.reach, QUICK_A
+        return kernels.compact_align(luma, disparity, *where, torch.tensor(WEIGHTS), FLAT, most)
+
     def gathered(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
         ways = places.offsets, places.moves
         return Gathered(*kernels.compact_warp(corners, disparity, *ways, places.reach, QUICK_A, position, self._dtype))
@@ -162,6 +171,10 @@ class TorchParts:
         near = torch.stack([padded[y : y + h, x : x + w] for y in range(3) for x in range(3)])  # (9, h, w)
         weights = torch.addmm(heads.spread[1][:, None], heads.spread[0], rows.T).view(PHASES, 9, h, w).softmax(1)
         return weights.mul_(near).sum(1)
+
+    def aligned(self, luma: Tensor, disparity: Tensor, places: Places, most: float) -> Tensor:
+        warped = full_size(_warped_phases(luma.unsqueeze(1), disparity, places))  # (4, 1, 2 h, 2 w)
+        return disparity + phases_of(alignment_step(warped, places.offsets, most)[0, 0])
 
     def gathered(self, corners: Tensor, disparity: Tensor, places: Places, position: tuple[float, float]) -> Gathered:
         """`warped` is (4, 3, 4, h, w), by input, channel and phase."""
@@ -212,7 +225,7 @@ def planes(values: Tensor) -> Tensor:
 
 
 def _warped_phases(corners: Tensor, disparity: Tensor, places: Places) -> Tensor:
-    """The inputs (4, 3, ., .) warped by the phases (4, h, w) of a disparity: (4, 3, 4, h, w)."""
+    """The inputs (4, C, ., .) warped by the phases (4, h, w) of a disparity: (4, C, 4, h, w)."""
     _, h, w = disparity.shape
     phase = torch.arange(PHASES).view(PHASES, 1, 1)
     rows = (2 * torch.arange(h).view(1, h, 1) + phase // 2 + places.reach).float()  # (4, h, 1)
@@ -221,7 +234,7 @@ def _warped_phases(corners: Tensor, disparity: Tensor, places: Places) -> Tensor
     move_x, move_y = places.moves.view(INPUTS, 2, 1, 1, 1).unbind(1)
     x = torch.addcmul(columns + move_x, du, disparity).view(INPUTS, PHASES * h, w)
     y = torch.addcmul(rows + move_y, dv, disparity).view(INPUTS, PHASES * h, w)
-    return quick_sample(corners, x, y).view(INPUTS, 3, PHASES, h, w)
+    return quick_sample(corners, x, y).view(INPUTS, -1, PHASES, h, w)
 
 
 def parts_of(heads: Heads, dtype: torch.dtype) -> Parts:

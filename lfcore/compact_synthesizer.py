@@ -9,6 +9,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from lfcore.alignment import MOST
 from lfcore.allocator import keep_freed_memory
 from lfcore.compact import ALIGNMENT, CompactModel
 from lfcore.compact_inference import Coloured, CompactInference
@@ -41,7 +42,7 @@ def half_luma(images: Tensor) -> Tensor:
 
 
 class CompactSynthesizer:
-    """See lfcore.synthesizer.Synthesizer. Memory while it works: about 600 bytes a pixel.
+    """See lfcore.synthesizer.Synthesizer. Memory while it works: about 640 bytes a pixel.
 
     The warped inputs of its syntheses are put together when first asked for: that would take as long as a network.
     """
@@ -58,7 +59,8 @@ class CompactSynthesizer:
         self._span = Span()
         self._edge = self._swept_edge = REACH  # by which the inputs of the warp are continued, and those of the sweep
         self._corners: Tensor | None = None  # prepared for the warp
-        self._luma: Tensor | None = None  # (4, 1, h + edge, w + edge): swept; smaller where the span says so
+        self._luma: Tensor | None = None  # (4, H + 2 edge, W + 2 edge): to see where the warped ones agree
+        self._half_luma: Tensor | None = None  # (4, 1, h + edge, w + edge): swept; smaller where the span says so
         keep_freed_memory()
 
     def set_light_field(self, light_field: LightField) -> None:
@@ -69,12 +71,13 @@ class CompactSynthesizer:
         self._edge, self._swept_edge = span.edges(REACH, self.config.levels)
         padded = continued_by_others(corners, self._edge, span.shift, ALIGNMENT)
         self._corners = self._networks.prepared(root_tone(padded))
+        self._luma = root_tone(luminance(padded))
         if span.scale > 1:
             small = made_smaller(corners, span.scale)
             padded = continued_by_others(small, self._swept_edge, span.in_small, ALIGNMENT)
-        self._luma = half_luma(padded).unsqueeze(1)
+        self._half_luma = half_luma(padded).unsqueeze(1)
         with torch.inference_mode():
-            self._networks.expect(self._swept(self._luma, corner_offsets(0.5, 0.5)))
+            self._networks.expect(self._swept(self._half_luma, corner_offsets(0.5, 0.5)))
 
     @property
     def weighs(self) -> bool:
@@ -96,21 +99,22 @@ class CompactSynthesizer:
 
     def _computed(self, u: float, v: float, cancelled: Callable[[], bool]) -> tuple[LateSynthesis, Gathered, Coloured]:
         """The synthesis without warped inputs, these, and what came out of the colour network."""
-        if self._corners is None or self._luma is None:
+        if self._corners is None or self._luma is None or self._half_luma is None:
             raise InputError("No light field is set; call set_light_field first.")
         check_viewpoint(u, v)
         offsets = corner_offsets(u, v)
         clock = Clock()
         with torch.inference_mode():
             check_cancelled(cancelled)
-            deviations = self._swept(self._luma, offsets)
+            deviations = self._swept(self._half_luma, offsets)
             clock.lap("features")
             check_cancelled(cancelled)
             disparity = self._as_large(self._networks.disparity(deviations))  # (4, h, w), phases, px of the network
-            clock.lap("disparity")
-            check_cancelled(cancelled)
             moves = self._span.shift * offsets + torch.tensor(self._correction.moves(u, v))
             places = Places(self._span.scale * offsets, moves, self._edge)
+            disparity = self._networks.aligned(self._luma, disparity, places, MOST / self._span.scale)
+            clock.lap("disparity")
+            check_cancelled(cancelled)
             gathered = self._networks.warp(self._corners, disparity, places, (u, v))
             clock.lap("warp")
             check_cancelled(cancelled)

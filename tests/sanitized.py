@@ -22,6 +22,7 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined",
 TESTS = {
     "app.painting._painting": ["test_painting", "test_panel_painting", "test_repainting"],
     "lfcore._kernels": [
+        "test_alignment",
         "test_amx",
         "test_compact",
         "test_compact_inference",

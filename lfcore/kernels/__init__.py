@@ -28,6 +28,7 @@ _FUNCTIONS = (
     "amx_products",
     "amx_convolution",
     "compact_disparity",
+    "compact_align",
     "compact_warp",
     "compact_blend",
 )
@@ -326,6 +327,37 @@ def compact_disparity(
     halved = dtype == torch.bfloat16
     _KERNELS.compact_disparity(*parts, *sizes, sharpness, halved, halved and can_convolve(dtype), torch.get_num_threads())
     return disparity
+
+
+def compact_align(
+    luma: Tensor,
+    disparity: Tensor,
+    offsets: Tensor,
+    moves: Tensor,
+    reach: int,
+    a: float,
+    weights: Tensor,
+    flat: float,
+    most: float,
+) -> Tensor:
+    """The phases of a disparity, moved to where the inputs agree best: what lfcore.alignment does, warp included.
+
+    luma: (4, H, W) float32, continued by `reach` px beyond the edges, at least two. disparity: (4, h, w) float32. offsets,
+    moves, a: as for `compact_warp`. weights: (7,) float32, flat, most: see lfcore.alignment. Returns (4, h, w) float32.
+    Beside it, memory for 24 bytes a pixel of the picture.
+    """
+    assert _KERNELS is not None
+    _, height, width = disparity.shape
+    assert luma.ndim == 3 and luma.shape[0] == 4 and min(luma.shape[1:]) >= 4 and reach >= 2 and luma.numel() < 2**31
+    assert disparity.shape[0] == 4 and offsets.shape == moves.shape == (4, 2)
+    along_axes = torch.stack((offsets.T, moves.T))  # (2, 2, 4)
+    assert weights.shape == (7,)
+    _check((), (luma, disparity, along_axes, weights))
+    warped, products = torch.empty(2 * height, 4, 2 * width + 2), torch.empty(2 * height, 2, 2 * width)
+    aligned = torch.empty(4, height, width)
+    parts = _addresses((luma, disparity, along_axes, weights, warped, products, aligned))
+    _KERNELS.compact_align(*parts, *luma.shape[1:], height, width, reach, a, flat, most, torch.get_num_threads())
+    return aligned
 
 
 def warp_type(dtype: torch.dtype) -> torch.dtype:

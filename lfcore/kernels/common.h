@@ -94,6 +94,14 @@ PART void cubic_taps_of_four(Four t, float a, Four taps[4]) {
     }
 }
 
+/* A sample of one channel, from the first of the sixteen values around it; `width`: from one row of them to the next. */
+PART float sample_inside(const float *place, Py_ssize_t width, Four across, const Four down) {
+    const Four sum = down[0] * four_at(place) + down[1] * four_at(place + width) + down[2] * four_at(place + 2 * width) +
+                     down[3] * four_at(place + 3 * width);
+    const Four weighed = across * sum;
+    return (weighed[0] + weighed[1]) + (weighed[2] + weighed[3]);
+}
+
 PART int32_t whole_below(float place) {
     const int32_t towards_zero = (int32_t)place;
     return towards_zero - ((float)towards_zero > place);

@@ -12,6 +12,7 @@ PyObject *amx(PyObject *module, PyObject *arguments); /* amx.c */
 PyObject *amx_products(PyObject *module, PyObject *arguments); /* amx.c */
 PyObject *amx_convolution(PyObject *module, PyObject *arguments); /* amx_convolution.c */
 PyObject *compact_disparity(PyObject *module, PyObject *arguments); /* compact_disparity.c */
+PyObject *compact_align(PyObject *module, PyObject *arguments); /* compact_align.c */
 PyObject *compact_warp(PyObject *module, PyObject *arguments); /* compact_warp.c */
 PyObject *compact_blend(PyObject *module, PyObject *arguments); /* compact_blend.c */
 
@@ -26,6 +27,7 @@ static PyMethodDef methods[] = {
     {"amx_products", amx_products, METH_VARARGS, NULL},
     {"amx_convolution", amx_convolution, METH_VARARGS, NULL},
     {"compact_disparity", compact_disparity, METH_VARARGS, NULL},
+    {"compact_align", compact_align, METH_VARARGS, NULL},
     {"compact_warp", compact_warp, METH_VARARGS, NULL},
     {"compact_blend", compact_blend, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},

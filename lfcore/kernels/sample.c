@@ -16,13 +16,6 @@ PART float near_picture(float place, Py_ssize_t size) {
     return bounded < last ? bounded : last;
 }
 
-PART float sample_inside(const float *place, Py_ssize_t width, Four across, const Four down) {
-    const Four sum = down[0] * four_at(place) + down[1] * four_at(place + width) + down[2] * four_at(place + 2 * width) +
-                     down[3] * four_at(place + 3 * width);
-    const Four weighed = across * sum;
-    return (weighed[0] + weighed[1]) + (weighed[2] + weighed[3]);
-}
-
 PART float sample_at_edge(const float *channel, Py_ssize_t height, Py_ssize_t width, Py_ssize_t top, Py_ssize_t left,
                           const Four across, const Four down) {
     float sum = 0.0f;

@@ -13,11 +13,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from lfcore.alignment import MOST, alignment_step
 from lfcore.compact import ALIGNMENT, CompactModel, initialise_compact
 from lfcore.compact_synthesizer import REACH, half_luma, half_resolution
 from lfcore.models import Model
 from lfcore.networks import BORDER, FullModel, SingleModel, colour_features, initialise, single_features, sweep_luminance
-from lfcore.planesweep import Levels, Window, deviation_sweep, plane_sweep
+from lfcore.planesweep import Levels, Window, deviation_sweep, luminance, plane_sweep
 from lfcore.synthesizer import corner_offsets
 from lfcore.tone import root_tone
 from lfcore.training.conditioning import condition, initialise_conditioned, plain_copy
@@ -182,7 +183,7 @@ class CompactPair:
         deviations = _half_sweep(places, batch, model.config.levels)
         with autocast():
             disparity: Tensor = model.disparity(deviations)  # (., 1, P, P)
-        return disparity
+        return _aligned(places, batch, disparity)
 
 
 class SingleNetwork:
@@ -262,6 +263,17 @@ def _half_sweep(places: Sequence[_Place], batch: Batch, levels: Levels) -> Tenso
     )
 
 
+def _aligned(places: Sequence[_Place], batch: Batch, disparity: Tensor) -> Tensor:
+    """A disparity (sum of B, 1, P, P), moved to where the inputs agree best."""
+    pieces = zip(places, disparity.split(batch.sizes), batch.offsets, batch.groups, strict=True)
+    aligned = []
+    for place, piece, offsets, group in pieces:
+        luma = root_tone(luminance(place.images)).unsqueeze(2)  # (4, B, 1, H, W)
+        warped = _quick_warp_inputs(luma, piece - group.shift, offsets, place.window)  # (B, 4, P, P)
+        aligned.append(piece + alignment_step(warped.transpose(0, 1), offsets, MOST))
+    return torch.cat(aligned)
+
+
 def _toned_and_warped(places: Sequence[_Place], batch: Batch, disparity: Tensor) -> Tensor:
     """The inputs of all groups in the root tone, warped by (sum of B, 1, P, P): (sum of B, 12, P, P)."""
     pieces = zip(places, disparity.split(batch.sizes), batch.offsets, batch.groups, strict=True)
@@ -274,7 +286,7 @@ def _toned_and_warped(places: Sequence[_Place], batch: Batch, disparity: Tensor)
 
 
 def _quick_warp_inputs(inputs: Tensor, disparity: Tensor, offsets: Tensor, window: Window) -> Tensor:
-    """As `warp_inputs`, by the warp of the compact models."""
+    """As `warp_inputs`, by the warp of the compact models, of inputs with any number of channels: (B, 4 C, h, w)."""
     n, b, c, height, width = inputs.shape
     warped = quick_warp(
         inputs.reshape(n * b, c, height, width),
