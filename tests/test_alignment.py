@@ -38,7 +38,7 @@ def aligned(luma: torch.Tensor, disparity: torch.Tensor, scale: float = 1.0, mos
     networks = CompactInference(CompactModel(), Tuning())
     places = Places(scale * corner_offsets(*VIEWPOINT), torch.zeros(4, 2), REACH)
     with torch.inference_mode():
-        return full_size(networks.aligned(luma, phases_of(disparity).contiguous(), places, most))
+        return full_size(networks.aligned(luma, phases_of(disparity), places, most))
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
@@ -78,7 +78,7 @@ def test_it_is_the_step_that_is_trained_with() -> None:
     luma = torch.nn.functional.avg_pool2d(torch.rand(4, SIZE[0] + 2 * REACH, SIZE[1] + 2 * REACH), 3, 1, 1)
     disparity, offsets, moves = 4 * torch.rand(SIZE) - 2, corner_offsets(0.9, 0.2), 0.3 * torch.randn(4, 2)
     networks = CompactInference(CompactModel(), Tuning())
-    found = full_size(networks.aligned(luma, phases_of(disparity).contiguous(), Places(offsets, moves, REACH), MOST))
+    found = full_size(networks.aligned(luma, phases_of(disparity), Places(offsets, moves, REACH), MOST))
     rows, columns = (torch.arange(size) + float(REACH) for size in SIZE)
     y = rows[:, None] + moves[:, 1].view(4, 1, 1) + offsets[:, 1].view(4, 1, 1) * disparity
     x = columns + moves[:, 0].view(4, 1, 1) + offsets[:, 0].view(4, 1, 1) * disparity
