@@ -16,7 +16,7 @@ from lfcore.networks import INPUTS
 
 # Weights of the pixels up to 3 px away, along each axis: means over 3 px of means over 5.
 WEIGHTS = (1 / 15, 2 / 15, 3 / 15, 3 / 15, 3 / 15, 2 / 15, 1 / 15)
-# Added to the squares of slopes, per px of disparity: where there is less of them, noise decides, and little is changed.
+# Added to the sums of squared slopes, which are per px of disparity: where they are less, noise decides, and little is changed.
 FLAT = 1e-3
 MOST = 1.0  # px of the picture by which a disparity is changed: slopes do not tell of more
 
