@@ -86,7 +86,7 @@ $(VENV)/ready-for-tests: $(SOURCES_OF_SETUP)
 define install
 $(find_python); \
 $(make_venv); \
-echo "Setting up in $(VENV) (once; about 1.3 GB, most of it torch) ..."; \
+echo "Setting up in $(VENV) (the first time about 1.3 GB, most of it torch) ..."; \
 $(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '$(1)'
 endef
 
